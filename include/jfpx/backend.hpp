@@ -1,4 +1,4 @@
-/// Computing devices, their availability, and the reason where one is unavailable.
+/// Computing devices, their availability, and the reason if a device is unavailable.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -25,9 +25,9 @@ struct BackendStatus {
 };
 
 /// Probes all backends and returns their status in a fixed order: cpu, cuda. Does not throw for a
-/// missing device and leaves no CUDA error pending. If there is a GPU, the first call starts CUDA,
-/// which takes some tenths of a second; otherwise `automatic` starts it on another thread.
-/// Thread-safe.
+/// missing device and leaves no CUDA error pending. If there is a GPU, the first call initializes
+/// CUDA, which takes some tenths of a second; without this call, `automatic` initializes CUDA on
+/// another thread. Thread-safe.
 JFPX_API std::vector<BackendStatus> available_backends();
 
 /// Returns "auto", "cpu" or "cuda".

@@ -11,8 +11,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Identifies a body of one World for the lifetime of the body. The id of a removed body is never
-/// reused. In another World, the id refers to the body with the same index and generation, or to
-/// none.
+/// reused. In another World, the id refers to the body with the same index and generation, if any.
 struct BodyId {
   std::uint32_t index = 0xffffffffu;
   std::uint32_t generation = 0;
@@ -36,33 +35,33 @@ JFPX_HD constexpr bool may_collide(const CollisionFilter& a, const CollisionFilt
 struct BodyDef {
   Shape shape = Sphere{};
   Real mass = 1;  ///< [kg], >= 0; 0 means immovable
-  /// A body that moves with its velocities, which only World::set_state() changes. It pushes other
-  /// bodies and is never pushed, whatever their mass. Requires mass 0; not for half-spaces and
-  /// planes.
+  /// A body that moves with constant velocities, which only World::set_state() changes. It pushes
+  /// other bodies and is never pushed, whatever their mass. Requires mass 0; not allowed for
+  /// half-spaces and planes.
   bool kinematic = false;
-  /// [kg m^2], about the centre of mass, in body axes; that of the solid shape if absent.
+  /// [kg m^2], about the centre of mass, in body axes. If absent, the inertia of the solid shape.
   /// Symmetric and positive definite, with no principal moment larger than the sum of the others.
-  /// Absent for mass 0.
+  /// Must be absent for mass 0.
   std::optional<Mat3> inertia;
   Vec3 position;          ///< [m], centre of mass
   Quat orientation;       ///< [-], unit, from body to world axes
   Vec3 velocity;          ///< [m/s]; ignored if the body is immovable and not kinematic
-  Vec3 angular_velocity;  ///< [rad/s], world frame; ignored in the same case
+  Vec3 angular_velocity;  ///< [rad/s], world frame; ignored like `velocity`
   /// [m/s^2], constant; gravity by default. Ignored for an immovable body.
   Vec3 acceleration{0, Real(-9.81), 0};
   Real linear_damping = 1;    ///< [-], fraction of velocity kept per second, in (0, 1]
-  Real angular_damping = 1;   ///< [-], the same for angular velocity
+  Real angular_damping = 1;   ///< [-], fraction of angular velocity kept per second, in (0, 1]
   Real friction = Real(0.5);  ///< [-], >= 0; combined by the rule of Scene::materials
   Real restitution = 0;       ///< [-], in [0, 1]; combined by the rule of Scene::materials
-  /// [m], >= 0: torques that oppose rolling and spinning are limited to this length times the
-  /// normal force. The larger value of two bodies counts. Solver::soft_step only.
+  /// [m], >= 0. The torques that oppose rolling and spinning are limited to this length times the
+  /// normal force. The larger value of the two bodies applies. Solver::soft_step only.
   Real rolling_friction = 0, spinning_friction = 0;
   bool can_sleep = true;   ///< the body may fall asleep; see SleepSettings
   CollisionFilter filter;  ///< bodies with which it collides
-  /// A sensor has contacts and contact events, but they are not resolved and wake no body: it
-  /// neither pushes other bodies nor is pushed. Contacts of contact generators are resolved.
+  /// A sensor has contacts and contact events, but the contacts are not resolved and wake no body.
+  /// Contacts of contact generators are resolved.
   bool sensor = false;
-  std::uint64_t user_data = 0;  ///< any value, for the program; has no effect
+  std::uint64_t user_data = 0;  ///< application data without effect
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };
 

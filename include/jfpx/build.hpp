@@ -11,8 +11,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Its size depends on the compiler switches that change types in the interface: _GLIBCXX_DEBUG,
-/// _GLIBCXX_USE_CXX11_ABI, -fpack-struct.
+/// A type whose size depends on the compiler switches that change types in the interface:
+/// _GLIBCXX_DEBUG, _GLIBCXX_USE_CXX11_ABI, -fpack-struct.
 struct LayoutProbe {
   std::vector<Real> vector;
   std::string text;
@@ -26,8 +26,8 @@ struct LibraryUsesSameCompilerSwitches {
   JFPX_API static const char value;
 };
 
-/// A translation unit that is compiled with other switches refers to a symbol that does not exist,
-/// so that the program does not link.
+/// A translation unit that is compiled with other switches refers to an undefined symbol, so that
+/// linking fails.
 [[gnu::used]] static constexpr const char* kLayoutCheck =
     &LibraryUsesSameCompilerSwitches<sizeof(LayoutProbe)>::value;
 

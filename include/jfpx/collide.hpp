@@ -24,8 +24,8 @@ JFPX_HD constexpr Touch make_touch(const SphereInstance& sphere, const Vec3& nor
   return {true, normal, sphere.centre - normal * (sphere.radius + distance * Real(0.5)), distance};
 }
 
-/// Sphere against half-space. A sphere that only touches is in contact, as is one at any depth
-/// inside.
+/// Sphere against half-space. A sphere that exactly touches the surface is in contact, and so is a
+/// sphere at any depth inside.
 JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const HalfSpace& half_space) {
   const Real distance = (dot(half_space.normal, sphere.centre) - half_space.offset) - sphere.radius;
   if (!(distance <= 0)) return {};
@@ -33,8 +33,8 @@ JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const HalfSpace& h
 }
 
 /// Sphere against box, by the point of the box that is closest to the centre (Ericson 2005, 5.2.5).
-/// A centre on or inside the box has no closest point that defines a direction; there the normal is
-/// that of the face of least depth, in the order x, y, z (erratum E9).
+/// If the centre is on or inside the box, the normal is that of the face of least depth, in the
+/// order x, y, z (erratum E9).
 JFPX_HD inline Touch collide(const SphereInstance& sphere, const Box& box, const Transform& pose) {
   const Vec3 local = transform_transpose(pose.basis, sphere.centre - pose.origin);
   Vec3 outside;
@@ -57,7 +57,7 @@ JFPX_HD inline Touch collide(const SphereInstance& sphere, const Box& box, const
   return make_touch(sphere, local[face] < 0 ? -axis : axis, -(sphere.radius + depth[face]));
 }
 
-/// Sphere against plane. A plane has no inside: the normal points to the side of the centre, and to
+/// Sphere against plane. A plane has no inside: the normal points to the side of the centre, or to
 /// the front if the centre is on the plane.
 JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const Plane& plane) {
   const Real height = dot(plane.normal, sphere.centre) - plane.offset;
@@ -70,7 +70,7 @@ JFPX_HD constexpr Touch collide(const SphereInstance& sphere, const Plane& plane
 struct ManifoldPoint {
   Vec3 point;         ///< [m], world, middle of the overlap
   Real distance = 0;  ///< [m], <= 0: negative penetration depth
-  /// Corners, edges and faces that form the point; equal from step to step while they do.
+  /// Identifies the corners, edges and faces that form the point; constant while they form it.
   std::uint32_t feature = 0;
   friend bool operator==(const ManifoldPoint&, const ManifoldPoint&) = default;
 };
@@ -85,8 +85,8 @@ struct Manifold {
   friend bool operator==(const Manifold&, const Manifold&) = default;
 };
 
-/// Box against half-space: the corners of the box inside the solid, each with its own depth
-/// (erratum E17), in the order of the signs of their coordinates: ---, +--, -+-, ++-, --+, ...
+/// Box against half-space. The points are the corners of the box inside the solid, each with its
+/// own depth (erratum E17), in the order of their signs: ---, +--, -+-, ++-, --+, ...
 JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose,
                                    const HalfSpace& half_space) {
   Manifold manifold;
@@ -105,8 +105,8 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose,
   return manifold;
 }
 
-/// Box against plane: as against a half-space whose surface is the plane and whose normal points to
-/// the side of the box's centre, or to the front if the centre is on the plane.
+/// Box against plane. Equals the test against a half-space whose surface is the plane and whose
+/// normal points to the side of the box's centre, or to the front if the centre is on the plane.
 JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose, const Plane& plane) {
   const bool behind = dot(plane.normal, pose.origin) < plane.offset;
   return behind ? collide(box, pose, HalfSpace{-plane.normal, -plane.offset})
@@ -114,11 +114,11 @@ JFPX_HD constexpr Manifold collide(const Box& box, const Transform& pose, const 
 }
 
 /// Box against box, by the separating-axis test over 15 axes (Gottschalk, Lin and Manocha 1996) and
-/// clipping of faces (Sutherland and Hodgman 1974). Thread-safe. Of equally good normals, that of a
-/// face of a is preferred, then a face of b, then a pair of edges; near ties count as ties.
-/// Separated boxes may be reported as touching if the gap is smaller than the rounding errors, or
-/// if edges deviate from parallel by less than 2 sqrt(epsilon) and the gap is smaller than that
-/// times their size.
+/// clipping of faces (Sutherland and Hodgman 1974). Thread-safe. Among equally good normals, a face
+/// of a precedes a face of b, which precedes a pair of edges; near ties count as ties. Separated
+/// boxes may be reported as touching if the gap is smaller than the rounding errors, or if edges
+/// deviate from parallel by less than 2 sqrt(epsilon) and the gap is smaller than that times their
+/// size.
 JFPX_API Manifold collide(const Box& a, const Transform& pose_a, const Box& b,
                           const Transform& pose_b);
 
@@ -127,7 +127,8 @@ JFPX_API Manifold collide(const Box& a, const Transform& pose_a, const Box& b,
 /// have one. The features are the numbers of the points.
 JFPX_API Manifold collide(const SolidShape& a, const Transform& pose_a, const SolidShape& b,
                           const Transform& pose_b);
-/// A solid of any kind against a half-space: of a capsule, the half balls that touch. Thread-safe.
+/// A solid of any kind against a half-space. A capsule has a point for each half ball that touches.
+/// Thread-safe.
 JFPX_API Manifold collide(const SolidShape& solid, const Transform& pose,
                           const HalfSpace& half_space);
 

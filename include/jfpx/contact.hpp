@@ -53,7 +53,7 @@ JFPX_HD constexpr Vec3 middle_point(const Vec3& normal, Real distance,
   return point_on_b(normal, sphere_b) + normal * (distance * Real(0.5));
 }
 
-/// Contacts sorted by (a, b), without duplicates. Valid until the next call on the collider.
+/// Contacts sorted by (a, b), without duplicates. Valid until the next call of the collider.
 using ContactSpan = std::span<const SphereContact>;
 
 }  // namespace JFPX_ABI

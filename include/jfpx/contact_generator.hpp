@@ -1,5 +1,5 @@
-/// Contacts that users generate (contact generators, thesis 4.3): ropes, rods and other limits on
-/// the distance of two bodies.
+/// Contact generators: user-defined contacts (thesis 4.3), for example ropes, rods and other limits
+/// on the distance of two bodies.
 #pragma once
 
 #include <jfpx/step_view.hpp>
@@ -18,10 +18,10 @@ struct ContactGeneratorId {
   friend bool operator==(const ContactGeneratorId&, const ContactGeneratorId&) = default;
 };
 
-/// A contact made by a contact generator. The solver stops the approach of the bodies along the
-/// normal, and moves them apart by `-distance`: as a soft contact with Solver::soft_step, to within
-/// ResolverSettings::position_epsilon with Solver::worst_first. If the normal points from a to b,
-/// the contact pulls the bodies together, as the end of a rope does.
+/// A contact of a contact generator. The solver stops the approach of the bodies along the normal
+/// and separates them by `-distance`: Solver::soft_step with a soft contact, Solver::worst_first to
+/// within ResolverSettings::position_epsilon. If the normal points from a to b, the contact pulls
+/// the bodies together, like the end of a rope.
 struct GeneratedContact {
   BodyId a = {}, b = {};  ///< two different bodies; one may have mass 0 and represent the world
   Vec3 normal = {};       ///< [-], unit, direction of the impulse on a; b receives the opposite
@@ -31,17 +31,17 @@ struct GeneratedContact {
   Real restitution = 0;   ///< [-], in [0, 1]
 };
 
-/// View of the world that a contact generator receives after contact detection, which
-/// Solver::worst_first runs after integration, and recipient of its contacts. Valid during the
-/// call, in the thread that makes it.
+/// Read access to the world for a contact generator, and recipient of its contacts. Generators run
+/// after contact detection (with Solver::worst_first, after integration). Valid during the call, in
+/// the calling thread.
 class JFPX_API ContactContext : public StepView {
  public:
   ContactContext(const BodyStore& bodies, double time, std::vector<Contact>* contacts)
       : StepView(bodies, time), contacts_(contacts) {}
 
   /// Adds a contact. A contact of two bodies of mass 0 is ignored. An awake body wakes the other.
-  /// @throws InvalidArgument for an id that is not of a living body, or a field out of its range;
-  ///   the step is then undone
+  /// @throws InvalidArgument for an id of no living body, or a field out of its range; the step is
+  ///   then undone
   void add(const GeneratedContact& contact);
 
  private:

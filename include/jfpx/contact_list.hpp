@@ -1,6 +1,6 @@
-/// Contact lists in the forms that programs with arrays need: between two sets of spheres, of many
-/// systems in one call, with every contact in both orders, and as compressed rows. Functions that
-/// take a SphereCollider must not run concurrently with other calls on it; all others are
+/// Contact lists for array-based programs: between two sets of spheres, of many systems in one
+/// call, with every contact in both orders, and as compressed rows. Functions that take a
+/// SphereCollider must not run concurrently with other calls of that collider; all others are
 /// thread-safe.
 #pragma once
 
@@ -14,10 +14,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Finds the touching pairs of a sphere `a` of `first` and a sphere `b` of `second`, sorted by
-/// (a, b). Both indices count from 0 in their own set. The normal points from b to a. Takes the
-/// time of a search among the spheres of both sets.
-/// @throws as SphereCollider::find_contacts(); messages count the spheres of `second` after those
-///   of `first`. std::bad_alloc
+/// (a, b). Both indices count from 0 in their own set. The normal points from b to a. Takes as long
+/// as a search among the spheres of both sets.
+/// @throws the exceptions of SphereCollider::find_contacts(), whose messages number the spheres of
+///   `second` after those of `first`; std::bad_alloc
 JFPX_API std::vector<SphereContact> find_contacts_between(SphereCollider& collider,
                                                           std::span<const SphereInstance> first,
                                                           std::span<const SphereInstance> second);
@@ -37,7 +37,7 @@ JFPX_API std::vector<SphereContact> find_contacts_in_systems(
 /// @throws std::bad_alloc
 JFPX_API std::vector<SphereContact> in_both_orders(ContactSpan contacts, std::size_t spheres);
 
-/// The same for pairs.
+/// Adds (b, a) for each pair (a, b). The result is sorted. Parameters as above.
 JFPX_API std::vector<SpherePair> in_both_orders(std::span<const SpherePair> pairs,
                                                 std::size_t spheres);
 
@@ -47,7 +47,7 @@ JFPX_API std::vector<SpherePair> in_both_orders(std::span<const SpherePair> pair
 /// @param rows number of rows, greater than every index a
 /// @throws std::bad_alloc
 JFPX_API std::vector<std::uint64_t> row_offsets(ContactSpan contacts, std::size_t rows);
-/// The same for pairs.
+/// Offsets of compressed rows (CSR) for pairs. Parameters as above.
 JFPX_API std::vector<std::uint64_t> row_offsets(std::span<const SpherePair> pairs,
                                                 std::size_t rows);
 

@@ -9,9 +9,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Amount of work of one SphereCollider call, or of one step of a world with Solver::soft_step, for
-/// which only `spheres` counts: the number of its bodies. The counts are doubles, so that none
-/// overflows.
+/// Amount of work of one SphereCollider call, or of one step of a world with Solver::soft_step. For
+/// a step, only `spheres` is used: the number of bodies. The counts are doubles to avoid overflow.
 struct ColliderWork {
   double spheres = 0;   ///< [-]
   double pairs = 0;     ///< [-], N*(N-1)/2 for find_contacts(), the list for find_touching()
@@ -37,13 +36,14 @@ constexpr double microseconds(const CostTerms& t, const ColliderWork& work) {
 
 /// Costs of all backends and algorithms, for this precision. The defaults were measured on an AMD
 /// EPYC of 2022 with AVX-512, with one thread, and on an NVIDIA H200. Backend::automatic corrects
-/// them by the times of the last calls.
+/// the costs by the times of recent calls.
 struct CostModel {
   CostTerms cpu_all_pairs, cpu_grid, cpu_given_pairs;
   CostTerms cuda_all_pairs, cuda_grid, cuda_given_pairs;
   CostTerms cpu_world, cuda_world;  ///< steps of a world of touching bodies
-  /// [ms] First use of the device, >= 0. When the predicted gain exceeds it, another thread starts
-  /// the device while the CPU goes on; 0 states that it is started already, and uses it at once.
+  /// [ms], >= 0, first use of the device. When the predicted gain exceeds it, another thread
+  /// initializes the device while the CPU continues. 0: the device is initialized, and used at
+  /// once.
   double cuda_start_ms = 200;
 
   JFPX_API CostModel();

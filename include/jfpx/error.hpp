@@ -8,7 +8,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Base class of all exceptions that jfpx itself throws. The message is a sentence for the user.
+/// Base class of all exceptions of jfpx. The message is a sentence for the user.
 class JFPX_API Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -1,6 +1,6 @@
-/// Forces that act on the bodies of a World in every step: those of the thesis (4.4.3) and the
-/// interface of user-defined forces. Aero, AeroControl and Explosion serve the demos of the thesis
-/// only.
+/// Forces that act on the bodies of a World in every step: the forces of the thesis (4.4.3) and the
+/// interface of user-defined forces. Aero, AeroControl and Explosion are used by the demos of the
+/// thesis only.
 #pragma once
 
 #include <jfpx/step_view.hpp>
@@ -17,12 +17,11 @@ struct ForceId {
   friend bool operator==(const ForceId&, const ForceId&) = default;
 };
 
-/// View of the world that a force receives at the start of a step, and recipient of its
-/// contributions. Contributions affect awake bodies only: a body that has come to rest under its
-/// forces stays asleep, and gravity wakes no body. A force that must affect sleeping bodies calls
-/// wake() or link(). Valid during the call, in the thread that makes it.
-/// @throws InvalidArgument, in all functions, for an id that is not of a living body; the step is
-///   then undone
+/// Read access to the world for a force at the start of a step, and recipient of its contributions.
+/// Contributions affect awake bodies only: a body that is at rest under its forces stays asleep,
+/// and gravity wakes no body. A force that must affect sleeping bodies calls wake() or link().
+/// Valid during the call, in the calling thread.
+/// @throws InvalidArgument, in all functions, for an id of no living body; the step is then undone
 class JFPX_API ForceContext : public StepView {
  public:
   ForceContext(BodyStore& bodies, double time) : StepView(bodies, time), bodies_(&bodies) {}
@@ -36,7 +35,7 @@ class JFPX_API ForceContext : public StepView {
 
   /// Wakes a movable body.
   void wake(BodyId id);
-  /// If one of the two bodies is awake, wakes the other if it is movable, so that they fall asleep
+  /// If one of the two bodies is awake, wakes the other movable body, so that both fall asleep
   /// together.
   void link(BodyId a, BodyId b);
 
@@ -57,8 +56,8 @@ concept CheckedForce = Force<F> && requires(const F& force, const ForceContext& 
   force.validate(context);
 };
 
-/// Force mass * acceleration on one body or on all, in addition to BodyDef::acceleration, which is
-/// gravity by default.
+/// Force mass * acceleration on one body or on all bodies. Adds to BodyDef::acceleration, whose
+/// default is gravity.
 struct JFPX_API Gravity {
   Vec3 acceleration{0, Real(-9.81), 0};  ///< [m/s^2], finite
   std::optional<BodyId> body = {};       ///< all bodies if absent
@@ -78,7 +77,7 @@ struct JFPX_API Drag {
   void operator()(ForceContext& context) const;
 };
 
-/// Attachment point of a spring: a point of a body, or of the world if there is no body.
+/// Attachment point of a spring: a point of a body, or of the world if `body` is absent.
 struct Attachment {
   std::optional<BodyId> body = {};
   Vec3 point = {};  ///< [m], in body axes from the centre of mass; without a body in world axes
@@ -88,7 +87,7 @@ struct Attachment {
 /// (errata E20, E21). At zero length the line is undefined and the force is zero. Steps must be
 /// short compared with sqrt(mass / stiffness).
 struct JFPX_API Spring {
-  Attachment a = {}, b = {};  ///< at least one has a body; not both the same body
+  Attachment a = {}, b = {};  ///< at least one has a body; the bodies differ
   Real stiffness = 0;         ///< [N/m], >= 0
   Real damping = 0;           ///< [N s/m], >= 0, times the rate of change of the length
   Real rest_length = 0;       ///< [m], >= 0
@@ -96,7 +95,7 @@ struct JFPX_API Spring {
   void operator()(ForceContext& context) const;
 };
 
-/// A spring without force when it is shorter than its rest length.
+/// A spring without force while it is shorter than its rest length.
 struct JFPX_API Bungee {
   Attachment a = {}, b = {};
   Real stiffness = 0, damping = 0, rest_length = 0;  ///< as in Spring
@@ -139,8 +138,8 @@ struct JFPX_API Buoyancy {
   void operator()(ForceContext& context) const;
 };
 
-/// Pressure wave: a spherical shell that expands from a point, wakes the bodies in it, pushes them
-/// outwards and fades. Across the shell, the force rises linearly to the middle and falls again.
+/// Pressure wave: a spherical shell that expands from a point. It wakes the bodies in the shell,
+/// pushes them outwards and fades. The force rises linearly to the middle of the shell and falls.
 struct JFPX_API Explosion {
   Vec3 centre = {};     ///< [m]
   Real start = 0;       ///< [s], of the world's time

@@ -18,26 +18,26 @@ struct JointId {
   friend bool operator==(const JointId&, const JointId&) = default;
 };
 
-/// Keeps the distance of two points of two bodies in a range: a rod, if both lengths are equal; a
-/// rope, if min_length is 0. Between the limits, a spring may act. The limits hold as contacts do:
-/// they yield a little under load, less with more substeps.
+/// Keeps the distance of two points of two bodies in a range: a rod if both lengths are equal, a
+/// rope if min_length is 0. A spring may act between the limits. The limits are soft like contacts:
+/// they yield slightly under load, less with more substeps.
 struct DistanceJoint {
-  /// In a Scene, only the index counts, which is that in Scene::bodies. One of the bodies, at
-  /// least, must be movable.
+  /// In a Scene, only the index is used: the index in Scene::bodies. At least one of the two bodies
+  /// must be movable.
   BodyId a{};
   std::optional<BodyId> b{};  ///< absent: the world
-  /// [m], points of the bodies in body axes, from the centre of mass; of the world, its
-  /// coordinates. At most 1e9 each.
+  /// [m], points of the bodies in body axes, from the centre of mass; if `b` is absent, anchor_b is
+  /// in world coordinates. At most 1e9 each.
   Vec3 anchor_a{}, anchor_b{};
   Real min_length = 0;          ///< [m], in [0, max_length]
   Real max_length = Real(1e9);  ///< [m], at most 1e9
   Real rest_length = 0;         ///< [m], in [0, 1e9], of the spring
-  /// [Hz], in [0, 1e6], frequency of the spring with the masses of the two bodies. 0: no spring. A
-  /// rod has none. Above 0.04 divided by the substep, the spring loses energy.
+  /// [Hz], in [0, 1e6], frequency of the spring with the masses of the two bodies; 0: no spring.
+  /// Ignored by a rod. Above 0.04 divided by the substep, the spring loses energy.
   Real hertz = 0;
   Real damping_ratio = 0;          ///< [-], in [0, 1000], of the spring; 1: critical
   bool collide_connected = false;  ///< whether the two bodies have contacts with each other
-  std::uint64_t user_data = 0;     ///< any value, for the program; has no effect
+  std::uint64_t user_data = 0;     ///< application data without effect
   friend bool operator==(const DistanceJoint&, const DistanceJoint&) = default;
 };
 
@@ -46,9 +46,9 @@ using Joint = std::variant<DistanceJoint>;
 
 /// A joint after the last step.
 struct JointState {
-  Vec3 point_a, point_b;  ///< [m], anchors in the world
+  Vec3 point_a, point_b;  ///< [m], anchors in world coordinates
   Real length = 0;        ///< [m], their distance
-  /// [N], along the line of the anchors, mean of the last substep; > 0: pulls the bodies together.
+  /// [N], along the line of the anchors, mean over the last substep; > 0: pulls the bodies together
   Real force = 0;
   friend bool operator==(const JointState&, const JointState&) = default;
 };

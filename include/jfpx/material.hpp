@@ -1,4 +1,4 @@
-/// Rules that combine the coefficients of two bodies into that of their contact.
+/// Rules that combine the coefficients of two bodies into the coefficient of their contact.
 #pragma once
 
 #include <jfpx/math.hpp>

@@ -12,7 +12,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Machine epsilon of Real. A vector that is not longer has no direction.
+/// Machine epsilon of Real. A vector of at most this length has no direction.
 inline constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
 /// The largest finite Real, as a constant, because device code can't call numeric_limits.
 inline constexpr Real kMaxReal = std::numeric_limits<Real>::max();
@@ -77,7 +77,7 @@ JFPX_HD constexpr Vec3 add_scaled(const Vec3& v, const Vec3& direction, Real sca
 }
 JFPX_HD constexpr Real length_squared(const Vec3& v) { return dot(v, v); }
 JFPX_HD inline Real length(const Vec3& v) { return square_root(length_squared(v)); }
-/// v scaled to length 1. A vector not longer than kEpsilon has no direction and is returned
+/// v scaled to length 1. A vector of length kEpsilon or less has no direction and is returned
 /// unchanged.
 JFPX_HD inline Vec3 normalized(const Vec3& v) {
   const Real n = length(v);
@@ -104,7 +104,7 @@ JFPX_HD constexpr Quat conjugate(const Quat& q) { return {q.w, -q.x, -q.y, -q.z}
 JFPX_HD constexpr Real length_squared(const Quat& q) {
   return q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
 }
-/// q scaled to length 1; the identity if q is not longer than kEpsilon (erratum E24).
+/// q scaled to length 1; the identity if the length is kEpsilon or less (erratum E24).
 JFPX_HD inline Quat normalized(const Quat& q) {
   const Real n2 = length_squared(q);
   if (!(n2 > kEpsilon * kEpsilon)) return {};

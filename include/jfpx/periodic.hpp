@@ -1,5 +1,5 @@
 /// Contacts among spheres in a periodic cell. Functions that take a SphereCollider must not run
-/// concurrently with other calls on it.
+/// concurrently with other calls of that collider.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
@@ -12,9 +12,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// An orthogonal cell that repeats along some axes. Positions may lie outside of it.
+/// An orthogonal cell that repeats along some axes. Positions may lie outside the cell.
 struct PeriodicCell {
-  Vec3 lengths;  ///< [m], each > 0 where the cell repeats; otherwise without effect
+  Vec3 lengths;  ///< [m], > 0 along repeating axes; otherwise ignored
   std::array<bool, 3> repeats{true, true, true};
 };
 
@@ -30,30 +30,30 @@ struct PeriodicContact {
 };
 
 /// Finds the touching pairs of spheres and images of spheres (minimum image convention), sorted by
-/// (a, b), a < b. A pair that touches through two images, which are then half a length apart, is
-/// listed once, with the lower shift. The bits do not depend on the collider: centres are reduced
-/// to the cell, and the image of b is displaced by at most one length, with one rounding each.
-/// @throws InvalidArgument as SphereCollider::find_contacts(); for a length that is not > 0, is
-///   more than half of the largest number or is less than four times the largest radius, and for a
+/// (a, b), a < b. A pair that touches through two images, which are half a length apart, is listed
+/// once, with the lower shift. The bits do not depend on the collider: centres are reduced to the
+/// cell, and the image of b is displaced by at most one length, with one rounding each.
+/// @throws InvalidArgument like SphereCollider::find_contacts(); for a length that is not > 0,
+///   exceeds half of the largest number, or is less than four times the largest radius; for a
 ///   centre that is 2^20 lengths or more from the origin. std::bad_alloc
 JFPX_API std::vector<PeriodicContact> find_periodic_contacts(
     SphereCollider& collider, std::span<const SphereInstance> spheres, const PeriodicCell& cell);
 
-/// Finds the touching pairs of a sphere `a` of `first` and a sphere `b` or its image of `second`,
-/// sorted by (a, b). Both indices count from 0 in their own set. Takes the time of a search among
+/// Finds the touching pairs of a sphere `a` of `first` and a sphere `b` of `second` or its image,
+/// sorted by (a, b). Both indices count from 0 in their own set. Takes as long as a search among
 /// the spheres of both sets.
-/// @throws as find_periodic_contacts(), for the radii of both sets; messages count the spheres of
-///   `second` after those of `first`
+/// @throws the exceptions of find_periodic_contacts(), for the radii of both sets; messages number
+///   the spheres of `second` after those of `first`
 JFPX_API std::vector<PeriodicContact> find_periodic_contacts_between(
     SphereCollider& collider, std::span<const SphereInstance> first,
     std::span<const SphereInstance> second, const PeriodicCell& cell);
 
-/// Finds the contacts within each of many independent systems, as find_contacts_in_systems(), where
-/// each system has a cell of its own.
+/// Finds the contacts within each of many independent systems, like find_contacts_in_systems().
+/// Each system has its own cell.
 /// @param offsets ascending, from 0 to the number of spheres
 /// @param cells one for each system
-/// @throws InvalidArgument for bad offsets, for another number of cells, and as
-///   find_periodic_contacts(). std::bad_alloc
+/// @throws InvalidArgument for invalid offsets or another number of cells; the exceptions of
+///   find_periodic_contacts(); std::bad_alloc
 JFPX_API std::vector<PeriodicContact> find_periodic_contacts_in_systems(
     SphereCollider& collider, std::span<const SphereInstance> spheres,
     std::span<const std::uint64_t> offsets, std::span<const PeriodicCell> cells);

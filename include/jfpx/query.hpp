@@ -16,9 +16,9 @@ struct Ray {
   Real max_distance = std::numeric_limits<Real>::infinity();  ///< [m], >= 0
 };
 
-/// Point where a ray enters a body. A ray that starts in a body, or on its surface, hits it at
-/// distance 0 with a normal opposite to the ray. All numbers are finite: an intersection with a
-/// wall at a distance that Real cannot represent is no hit.
+/// Point where a ray enters a body. If the ray starts in a body or on its surface, the distance is
+/// 0 and the normal is opposite to the ray. All numbers are finite: an intersection with a wall at
+/// a distance beyond the range of Real is not a hit.
 struct RayHit {
   BodyId body;
   Real distance = 0;  ///< [m], from the origin

@@ -1,4 +1,4 @@
-/// A world that records its run with all calls that change it, so that the run can be repeated.
+/// A world that records its states and all calls that change it, for replay.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -14,14 +14,14 @@ inline namespace JFPX_ABI {
 
 class RecordingReader;
 
-/// A force that a recording can contain: one of force.hpp. A user's own force, like a contact
-/// generator, is code that a file can't store.
+/// A force that a recording can contain: one of force.hpp. User-defined forces and contact
+/// generators are code and cannot be stored in a file.
 using RecordableForce =
     std::variant<Gravity, Drag, Spring, Bungee, Aero, AeroControl, Buoyancy, Explosion>;
 
-/// A World whose changes are recorded, in the file that RecordingWriter describes. It has the
-/// functions of World that a file can store, with the same results and exceptions; `jfpx replay`
-/// repeats the recorded run. Not thread-safe, except for reading world().
+/// A World whose changes are recorded in the file of RecordingWriter. It has the functions of World
+/// that a file can store, with the same results and exceptions; `jfpx replay` repeats the run. Not
+/// thread-safe, except for reading world().
 class JFPX_API RecordedWorld {
  public:
   /// @throws as World and RecordingWriter
@@ -57,7 +57,7 @@ class JFPX_API RecordedWorld {
   void apply_torque(BodyId id, const Vec3& torque);
 
   ForceId add_force(const RecordableForce& force);
-  /// Replaces the parameters of a force, as an assignment to World::force() does.
+  /// Replaces the parameters of a force, like an assignment to World::force().
   /// @throws InvalidArgument if the id is unknown or of a force of another type
   void set_force(ForceId id, const RecordableForce& force);
   void remove_force(ForceId id);
@@ -71,11 +71,11 @@ class JFPX_API RecordedWorld {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Makes the calls that a recording contains before a step. Does nothing for a recording of
-/// RecordingWriter, which contains none.
+/// Performs the recorded calls before a step. Has no effect for a recording of RecordingWriter,
+/// which contains no calls.
 /// @param step from 1 to reader.steps()
-/// @param world in the state before that step: made from the scene of the recording, and changed by
-///   repeating the calls and steps before
+/// @param world in the state before that step: created from the scene of the recording, with all
+///   earlier calls and steps repeated
 /// @throws InvalidArgument for another step; FileError if a call is invalid for the world
 JFPX_API void repeat_calls(RecordingReader& reader, std::uint64_t step, World& world);
 

@@ -22,8 +22,8 @@ struct RecordingHeader {
   friend bool operator==(const RecordingHeader&, const RecordingHeader&) = default;
 };
 
-/// Writes the states of a run frame by frame. Replay steps the scene and nothing else: a run that
-/// adds or removes bodies, or has forces, is recorded by RecordedWorld (recorded_world.hpp).
+/// Writes the states of a run frame by frame. Replay steps the scene without changes: use
+/// RecordedWorld (recorded_world.hpp) for a run that adds or removes bodies, or has forces.
 /// finish() creates the complete file under its name; until then the data are in NAME.part in the
 /// same folder, which the destructor removes. Not thread-safe.
 class JFPX_API RecordingWriter {
@@ -35,7 +35,9 @@ class JFPX_API RecordingWriter {
   RecordingWriter& operator=(RecordingWriter&&) noexcept;
 
   /// Appends the states of all bodies after the next step, in scene order.
-  /// @throws InvalidArgument if their number is not the scene's; FileError if the disk is full
+  /// @throws InvalidArgument for another number of bodies than the scene's; FileError if the disk
+  /// is
+  ///   full
   void append(std::span<const BodyState> states);
   /// Completes the file. @throws FileError
   void finish();
@@ -64,7 +66,7 @@ class JFPX_API RecordingReader {
   std::uint64_t steps() const;  ///< number of recorded steps
   /// States after step `step`, from 1 to steps(). @throws InvalidArgument outside that range
   std::vector<BodyState> states(std::uint64_t step);
-  /// Whether any frame has calls: see repeat_calls() in recorded_world.hpp. If not, all frames have
+  /// Whether any frame has calls; see repeat_calls() in recorded_world.hpp. If not, all frames have
   /// the bodies of the scene.
   bool has_calls() const;
   /// Calls before step `step`, as JSON; empty if there are none.

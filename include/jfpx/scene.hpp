@@ -1,4 +1,4 @@
-/// Scenes: bodies and settings as a plain value that every engine can run, and their JSON form.
+/// Scenes: bodies and settings as a plain value for all engines, and their JSON form.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 /// Algorithm that resolves the contacts of a native world.
 enum class Solver : std::uint8_t {
   soft_step,    ///< substeps over soft contacts with warm starting: stacks and heaps come to rest
-  worst_first,  ///< of the thesis (4.4.6), after thesis::enable(): one correction after the other
+  worst_first,  ///< of the thesis (4.4.6), after thesis::enable(): corrects the worst contact first
 };
 /// Name in the JSON of a scene; null for a value outside the enumeration.
 constexpr const char* to_string(Solver solver) {
@@ -35,17 +35,16 @@ inline constexpr std::uint32_t kMaxSubsteps = 64;
 struct SoftStepSettings {
   /// Number of substeps per step, in [1, kMaxSubsteps]. More substeps make contacts stiffer.
   std::uint32_t substeps = 4;
-  /// [Hz], >= 0, frequency of the contact springs between movable bodies; twice that against
-  /// immovable and kinematic bodies. 0, and values above it, mean a quarter of the substep rate.
+  /// [Hz], >= 0, frequency of the contact springs between movable bodies; doubled against immovable
+  /// and kinematic bodies. Limited to a quarter of the substep rate, which 0 selects.
   Real contact_hertz = 0;
   /// [-], in [0.01, 1000], of the contact springs. Between two movable spheres without rolling
-  /// friction it is multiplied by 6, and by 2 where they penetrate by more than 3 % of the smaller
-  /// radius.
+  /// friction, multiplied by 6, or by 2 if they penetrate by more than 3 % of the smaller radius.
   Real damping_ratio = 1;
   Real push_out_speed = 3;  ///< [m/s], > 0: maximum speed that removes a penetration
   Real restitution_threshold = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
-  /// [m], >= 0: pairs closer than this are in the solver before they touch; for small bodies, pairs
-  /// closer than 8 % of the smaller radius or half extent.
+  /// [m], >= 0. Closer pairs have speculative contacts in the solver before they touch. For small
+  /// bodies, the margin is 8 % of the smaller radius or half extent.
   Real speculative_margin = Real(0.02);
   friend bool operator==(const SoftStepSettings&, const SoftStepSettings&) = default;
 };
@@ -63,13 +62,13 @@ struct ResolverSettings {
 };
 
 /// Settings of the native sleep tests. Solver::soft_step puts an island of touching bodies to sleep
-/// when all of them have been slower than `speed` for `time`; Solver::worst_first tests the mean
+/// when all its bodies have been slower than `speed` for `time`. Solver::worst_first tests the mean
 /// motion of each body (thesis 4.4.2).
 struct SleepSettings {
   bool enabled = true;
-  /// [m/s], >= 0, limit of the velocity and of the angular velocity times the bounding radius, of
-  /// which 4 % count for spheres, because nothing brakes a sphere that spins in place; soft_step. A
-  /// body on which a force or torque acts must be 25 times slower.
+  /// [m/s], >= 0; soft_step. Limit of the velocity, and of the angular velocity times the bounding
+  /// radius. For spheres, 4 % of the latter count, because nothing brakes a sphere that spins in
+  /// place. The limit is divided by 25 for a body on which a force or torque acts.
   Real speed = Real(0.05);
   Real time = Real(0.5);     ///< [s], >= 0; soft_step
   Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: threshold of the mean motion; worst_first
@@ -93,10 +92,10 @@ struct Scene {
   ResolverSettings resolver;
   SleepSettings sleep;
   MaterialSettings materials;
-  /// Pairs of bodies that do not collide, whatever their filters. The order of the pairs and of the
-  /// two bodies of a pair has no effect, and a pair may occur more than once.
+  /// Pairs of bodies that do not collide, whatever their filters. The order of the pairs, and of
+  /// the bodies of a pair, has no effect. Duplicates are allowed.
   std::vector<BodyPair> ignored_pairs;
-  /// Joints, whose bodies are indices in `bodies`. Solver::soft_step only.
+  /// Joints; BodyId::index is an index into `bodies`. Solver::soft_step only.
   std::vector<Joint> joints;
   friend bool operator==(const Scene&, const Scene&) = default;
 };
@@ -110,11 +109,11 @@ inline constexpr Real kMaxCoordinate = Real(1e9);
 /// numbers typed with four digits. Engines normalise these values.
 inline constexpr Real kUnitTolerance = Real(1e-3);
 
-/// Checks every field that can affect a step. In addition to the ranges given with the fields,
+/// Checks every field that can affect a step. In addition to the documented ranges of the fields:
 /// sizes, positions and offsets must not exceed kMaxCoordinate, masses and moments of inertia must
 /// have finite inverses, dt must not be denormal, there may be at most 2^32 - 1 bodies, and an
-/// ignored pair or a joint must consist of two different bodies of the scene, of which one must be
-/// movable for a joint.
+/// ignored pair or a joint must refer to two different bodies of the scene. One of the bodies of a
+/// joint must be movable.
 /// @throws InvalidScene naming the first invalid body, the field, its value and the allowed range.
 JFPX_API void validate(const Scene& scene);
 

@@ -1,5 +1,5 @@
-/// Collision shapes as plain values. A shape is centred at the origin of its body's axes, unless
-/// its description differs.
+/// Collision shapes as plain values. A shape is centred at the origin of the body axes unless
+/// documented otherwise.
 #pragma once
 
 #include <jfpx/math.hpp>
@@ -39,7 +39,7 @@ struct HalfSpace {
 
 /// A two-sided wall without thickness: all points p with dot(normal, p) = offset, in world
 /// coordinates. It ignores the pose of its body. A body collides with the side on which its centre
-/// of mass lies, however far parts of it penetrate; a centre on the plane counts as on the front.
+/// of mass lies, at any depth of penetration; a centre on the plane counts as on the front.
 struct Plane {
   Vec3 normal{0, 1, 0};  ///< [-], unit, points to the front
   Real offset = 0;       ///< [m]
@@ -58,11 +58,10 @@ struct CompoundPart {
   friend bool operator==(const CompoundPart&, const CompoundPart&) = default;
 };
 
-/// Solids that move as one body (thesis 4.4.5) and do not collide with each other. The
-/// body's mass is distributed in proportion to density times volume; overlapping volume counts for
-/// each of the parts. The centre of mass of a movable body must be the origin of its axes, to a
-/// thousandth of its bounding radius, because engines use the origin as the centre of mass. See
-/// centred().
+/// Solids that move as one body (thesis 4.4.5) and do not collide with each other. The mass of the
+/// body is distributed in proportion to density times volume; overlapping volume counts for each
+/// part. The centre of mass of a movable body must be the origin of its axes, to a thousandth of
+/// its bounding radius, because engines use the origin as the centre of mass. See centred().
 struct Compound {
   std::vector<CompoundPart> parts;  ///< at least one
   friend bool operator==(const Compound&, const Compound&) = default;

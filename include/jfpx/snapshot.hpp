@@ -10,12 +10,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// State of a World, from World::snapshot() for World::restore(). It consists of everything that
-/// the following steps depend on, except for user-defined forces and contact generators.
+/// State of a World, from World::snapshot() for World::restore(). Contains all data that affect the
+/// following steps, except user-defined forces and contact generators.
 ///
-/// The bytes have a header with version and precision, and a checksum. They are a function of the
-/// state alone: worlds with the same state have equal snapshots, whatever their numbers of threads,
-/// backends and broad phases.
+/// The bytes have a header with version and precision, and a checksum. They depend on the state
+/// only: worlds with the same state have equal snapshots, regardless of the number of threads, the
+/// backend and the broad phase.
 struct Snapshot {
   std::vector<std::byte> bytes;  ///< the content of a file of save_snapshot()
   friend bool operator==(const Snapshot&, const Snapshot&) = default;

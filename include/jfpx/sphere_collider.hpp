@@ -1,5 +1,5 @@
-/// Contact search among spheres: the narrow phase, which the thesis computes on the GPU
-/// (thesis 4.5).
+/// Contact search among spheres: the narrow phase of the thesis, which runs on the GPU (thesis
+/// 4.5).
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -38,12 +38,12 @@ enum class ChoiceReason : std::uint8_t {
 /// Returns a short text for tables, for example "device failed".
 JFPX_API std::string_view to_string(ChoiceReason reason) noexcept;
 
-/// Options of make_sphere_collider(). With `Backend::automatic`, backend and algorithm are selected
-/// for each call from `costs` and from the times of the last calls. If CUDA is unavailable, the CPU
-/// computes. If the device fails or runs out of memory, the CPU replaces it permanently and
-/// produces the same bits. The start of CUDA takes some tenths of a second, unless
-/// available_backends() was called before: with `automatic` on another thread while the CPU goes on
-/// (see CostModel::cuda_start_ms), with `cuda` in make_sphere_collider().
+/// Options of make_sphere_collider(). Backend::automatic selects backend and algorithm for each
+/// call from `costs` and from the times of recent calls. If CUDA is unavailable, it selects the
+/// CPU. If the device fails or runs out of memory, the CPU replaces it permanently and produces the
+/// same bits. CUDA initialization takes some tenths of a second unless available_backends() was
+/// called before. `automatic` initializes CUDA on another thread while the CPU computes (see
+/// CostModel::cuda_start_ms); `cuda` initializes it in make_sphere_collider().
 struct SphereColliderOptions {
   Backend backend = Backend::automatic;
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;
@@ -58,10 +58,10 @@ struct TransferredBytes {
   std::uint64_t to_device = 0, from_device = 0;
 };
 
-/// Finds contacts among spheres. Owns its buffers, which only grow. Calls on one object are not
-/// thread-safe; different objects may be used concurrently. Results do not depend on the backend,
-/// the algorithm, the number of threads or the vector width. They stay valid until the next call on
-/// the same object.
+/// Finds contacts among spheres. Owns its buffers, which grow and never shrink. Calls on one object
+/// are not thread-safe; different objects may be used concurrently. Results do not depend on the
+/// backend, the algorithm, the number of threads or the vector width, and are valid until the next
+/// call on the same object.
 class JFPX_API SphereCollider {
  public:
   virtual ~SphereCollider();
@@ -99,8 +99,8 @@ class JFPX_API SphereCollider {
   virtual SphereAlgorithm algorithm() const noexcept = 0;
   /// Reason for the backend and algorithm of the last call.
   virtual ChoiceReason reason() const noexcept { return ChoiceReason::fixed; }
-  /// If the device failed in the last call and the CPU computed it instead, the message of that
-  /// failure; otherwise empty.
+  /// Error message if the device failed in the last call and the CPU computed the result; otherwise
+  /// empty.
   virtual std::string_view device_failure() const noexcept { return {}; }
 
  protected:
@@ -110,7 +110,7 @@ class JFPX_API SphereCollider {
   std::vector<SpherePair> pairs_of_contacts_;
 };
 
-/// Makes a collider. Thread-safe.
+/// Creates a collider. Thread-safe.
 /// @throws BackendUnavailable if `options.backend` is cpu or cuda and is unavailable;
 ///   InvalidArgument for an invalid option.
 JFPX_API std::unique_ptr<SphereCollider> make_sphere_collider(

@@ -10,7 +10,7 @@ inline namespace JFPX_ABI {
 
 class BodyStore;
 
-/// Bodies of a world during a step. Valid during the call that receives it.
+/// Bodies of a world during a step. Valid during the call of the force or generator.
 class JFPX_API StepView {
  public:
   StepView(const BodyStore& bodies, double time) : bodies_(&bodies), time_(time) {}
@@ -20,8 +20,7 @@ class JFPX_API StepView {
   std::span<const BodyId> bodies() const;   ///< living bodies in the order of their indices
   bool contains(BodyId id) const noexcept;  ///< whether the id is of a living body
 
-  /// @throws InvalidArgument, in all four, for an id that is not of a living body; the step is then
-  ///   undone
+  /// @throws InvalidArgument, in all four, for an id of no living body; the step is then undone
   BodyState state(BodyId id) const;
   const Shape& shape(BodyId id) const;
   Real mass(BodyId id) const;   ///< [kg]; 0: immovable or kinematic

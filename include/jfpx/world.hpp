@@ -21,8 +21,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Algorithm that finds the pairs of touching bounds. All of them give the same contacts, bit for
-/// bit. Queries (World::cast_ray() and others) do not use it.
+/// Algorithm that finds the pairs of touching bounds. All algorithms yield the same contacts, bit
+/// for bit. Queries (World::cast_ray() and others) do not use it.
 enum class BroadPhase : std::uint8_t {
   cells,        ///< the collider's own search, by SphereColliderOptions::algorithm
   hierarchy,    ///< after thesis::enable(): the thesis' tree of bounding spheres (4.4.5)
@@ -31,10 +31,10 @@ enum class BroadPhase : std::uint8_t {
 
 struct WorldSettings {
   /// Device and algorithm that find sphere contacts; `collider.threads` must be left at 1. With
-  /// Backend::cuda and Solver::soft_step, the state of the world is on the device, and all parts of
-  /// a step run there (docs/cuda.md); functions that read or change the state may then also throw
-  /// DeviceError. With Backend::automatic and Solver::soft_step, the world moves to the device and
-  /// back, whichever takes less time.
+  /// Backend::cuda and Solver::soft_step, the state of the world is on the device, and the whole
+  /// step runs there (docs/cuda.md); functions that read or change the state may then also throw
+  /// DeviceError. With Backend::automatic and Solver::soft_step, the world moves to the device or
+  /// back, whichever is predicted to be faster.
   SphereColliderOptions collider = {};
   /// Number of threads of a step on the CPU, at most 256; 0: one per core. With
   /// Solver::worst_first, only the search for sphere contacts uses them.
@@ -42,24 +42,24 @@ struct WorldSettings {
   BroadPhase broad_phase = BroadPhase::cells;
 };
 
-/// One contact point of two bodies. Boxes that touch along a face have several points, and so may
-/// compounds. Body `a` is chosen by the first rule that applies; a compound is not a sphere here:
+/// One contact point of two bodies. Boxes in contact along a face have several points; compounds
+/// may also have several. The first rule that applies selects body `a`; compounds are not spheres:
 ///   - two spheres: the one with the lower index;
 ///   - a sphere and a box, half-space or plane: the sphere;
 ///   - only one body is movable (has a mass other than 0): that body;
 ///   - otherwise: the body with the lower index.
-/// A contact of a contact generator has the bodies, the point and the direction of the normal that
-/// the generator has given it.
+/// A contact of a contact generator has the bodies, the point and the direction of the normal of
+/// its GeneratedContact.
 struct Contact {
   BodyId a, b;
   Vec3 normal;  ///< [-], unit, from b to a
-  /// [m], world: the middle of the overlap, or a point of b if the bodies met during the step
+  /// [m], world: the middle of the overlap, or a point of b if the contact began during the step
   Vec3 point;
-  Real distance = 0;     ///< [m], <= 0: the negative penetration depth; 0 if they met in the step
+  Real distance = 0;     ///< [m], <= 0: negative penetration depth; 0 if it began in the step
   Real friction = 0;     ///< [-], >= 0, of the pair
   Real restitution = 0;  ///< [-], in [0, 1], of the pair
-  /// Whether a or b is a sensor, so that the contact is not resolved; false for a contact of a
-  /// contact generator.
+  /// Whether a or b is a sensor; the contact is then not resolved. False for contacts of contact
+  /// generators.
   bool sensor = false;
   friend bool operator==(const Contact&, const Contact&) = default;
 };
@@ -70,8 +70,8 @@ enum class ContactPhase : std::uint8_t {
   end     ///< the bodies do not touch, and touched after the previous step
 };
 
-/// Contact of two bodies after a step, compared with the step before. At least one of the bodies is
-/// movable. One or both may be sensors.
+/// Change of the contact of two bodies in a step. At least one of the bodies is movable. One or
+/// both may be sensors.
 struct ContactEvent {
   ContactPhase phase = ContactPhase::begin;
   BodyId a, b;  ///< a.index < b.index; the bodies of an end event may have been removed
@@ -92,22 +92,22 @@ struct StepReport {
   std::uint64_t velocity_iterations = 0;
   bool iterations_exhausted = false;  ///< a solver loop stopped at its limit with work left
   /// A value of a body is no longer finite, or a coordinate exceeds kMaxCoordinate; the step was
-  /// undone. Check this field: further steps are also undone until the body is removed or gets
-  /// another state.
+  /// undone. Check this field: further steps are also undone until the body is removed or its state
+  /// is replaced.
   bool non_finite = false;
   BodyId non_finite_body;   ///< the first such body
   std::uint32_t awake = 0;  ///< movable bodies awake after the step
-  /// cuda: the GPU made the whole step, or found the sphere contacts of a step on the CPU.
+  /// cuda: the GPU performed the whole step, or found the sphere contacts of a step on the CPU.
   Backend backend = Backend::cpu;
   /// Algorithm that found the sphere contacts; `automatic` in a step on a GPU.
   SphereAlgorithm algorithm = SphereAlgorithm::automatic;
   ChoiceReason choice = ChoiceReason::fixed;  ///< reason for backend and algorithm
-  /// Error of a device whose work the CPU took over in this step; empty if there was none.
+  /// Error of a device that the CPU replaced in this step; empty if there was none.
   std::string device_failure;
   /// With Solver::soft_step, `integrate_ms` is the time of forces, and `resolve_ms` includes the
-  /// integration in substeps. In a step on a GPU, the first three are times of the device: they do
-  /// not include launches and transfers, as `total_ms` does, nor forces that the host applies. They
-  /// are 0 in a step that is left out, because the world sleeps.
+  /// integration in substeps. In a step on a GPU, the first three are device times, without
+  /// launches, transfers and forces that the host applies; `total_ms` includes all of these. All
+  /// are 0 in a step that is skipped because the world sleeps.
   double integrate_ms = 0, detect_ms = 0, resolve_ms = 0, total_ms = 0;
 };
 
@@ -119,9 +119,9 @@ class JFPX_API World {
   /// Validates the scene. Half-spaces and planes must be immovable.
   /// @throws InvalidScene, BackendUnavailable, OutOfMemory; InvalidArgument for a bad setting
   explicit World(const Scene& scene, const WorldSettings& settings = {});
-  /// As above, with the given collider, which may be a user's implementation.
-  /// Steps of Solver::soft_step call its find_pairs(), and only if spheres have moved enough.
-  /// @param threads of the other parts of a step, as SphereColliderOptions::threads
+  /// Creates a world with the given collider, which may be user-defined. Steps of Solver::soft_step
+  /// call its find_pairs(), and only if spheres have moved enough.
+  /// @param threads of the other parts of a step, like SphereColliderOptions::threads
   /// @throws InvalidArgument if the collider is null, `broad_phase` is not a value of the
   ///   enumeration or `threads` is too large; InvalidScene, OutOfMemory
   World(const Scene& scene, std::unique_ptr<SphereCollider> collider,
@@ -130,23 +130,23 @@ class JFPX_API World {
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
-  /// Adds a body. If memory runs out, this and all other functions that change bodies throw
-  /// std::bad_alloc and leave the world unchanged. Those that wake or describe neighbors may need
-  /// memory once after each step, for contacts(). For a world on a GPU, they throw DeviceError, and
-  /// leave the world unchanged, if they must copy it to the host and that fails.
+  /// Adds a body. If an allocation fails, this and all other functions that change bodies throw
+  /// std::bad_alloc and leave the world unchanged. Functions that wake or report neighbors may
+  /// allocate memory for contacts() once after each step. For a world on a GPU, these functions
+  /// throw DeviceError and leave the world unchanged if copying it to the host fails.
   /// @throws InvalidScene if the definition is invalid
   BodyId add(const BodyDef& body);
   /// Removes a body and wakes the bodies in contact with it.
-  /// @throws InvalidArgument if the id is not of a living body of this world
+  /// @throws InvalidArgument for an id of no living body of this world
   void remove(BodyId id);
 
   /// Advances the world by the dt of the scene. Scene::solver selects the stages: forces, detection
   /// and substeps, or forces, integration, detection and resolution. Physics throws no exceptions:
-  /// when a value is no longer finite, or a coordinate exceeds kMaxCoordinate, the step is undone
-  /// and StepReport::non_finite is set. Further steps are also undone until that body is removed or
-  /// gets another state.
-  /// @throws OutOfMemory, DeviceError and the exceptions of forces and contact generators; the
-  ///   state is then as before the step
+  /// if a value is no longer finite, or a coordinate exceeds kMaxCoordinate, the step is undone and
+  /// StepReport::non_finite is set. Further steps are also undone until that body is removed or its
+  /// state is replaced.
+  /// @throws OutOfMemory, DeviceError and the exceptions of forces and contact generators; the step
+  ///   is then undone
   StepReport step();
 
   /// Living bodies in the order of their indices. Valid until a body is added or removed.
@@ -169,7 +169,7 @@ class JFPX_API World {
   /// Whether the body is awake. A body of mass 0 is awake only if it is kinematic and moves.
   /// @throws InvalidArgument for an unknown id, as do mass(), inverse_inertia() and inertia()
   bool awake(BodyId id) const;
-  /// Wakes the body, as apply_force() does; has no effect on a body of mass 0. The next step also
+  /// Wakes the body, like apply_force(). Has no effect on a body of mass 0. The next step also
   /// wakes the bodies in contact with it, except through contacts of sensors.
   /// @throws InvalidArgument for an unknown id
   void wake(BodyId id);
@@ -184,9 +184,9 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id
   Vec3 last_acceleration(BodyId id) const;
 
-  /// Fields of BodyDef. A new value acts from the next step on. A change of friction wakes the body
-  /// and the bodies in contact with it, and a change of acceleration, mass or inertia the body;
-  /// restitution and damping do not affect bodies at rest.
+  /// Fields of BodyDef. A new value takes effect in the next step. A change of friction wakes the
+  /// body and the bodies in contact with it; a change of acceleration, mass or inertia wakes the
+  /// body. Restitution and damping do not affect bodies at rest.
   /// @throws InvalidArgument, as do all functions up to set_user_data(), for an unknown id or a
   ///   value out of the range of validate()
   Real friction(BodyId id) const;
@@ -199,7 +199,7 @@ class JFPX_API World {
   Real angular_damping(BodyId id) const;
   void set_damping(BodyId id, Real linear, Real angular);
   /// [kg], > 0. The inertia becomes that of the solid shape with this mass, unless it was given by
-  /// BodyDef::inertia or set_inertia(). A mass of 0 remains 0, and no other mass becomes 0.
+  /// BodyDef::inertia or set_inertia(). A mass of 0 cannot be changed or set.
   void set_mass(BodyId id, Real mass);
   /// [kg m^2], as BodyDef::inertia; absent: that of the solid shape. Has no effect on a body of
   /// mass 0.
@@ -220,8 +220,8 @@ class JFPX_API World {
   /// @throws InvalidArgument also if both are the same body
   void set_pair_ignored(BodyId a, BodyId b, bool ignored);
 
-  /// Adds a joint, which acts from the next step on, and wakes its bodies. Their contacts with each
-  /// other end, unless the joint lets them collide. Joints are removed with their bodies.
+  /// Adds a joint, which acts from the next step on, and wakes its bodies. Contacts between the two
+  /// bodies end unless the joint has collide_connected. Joints are removed with their bodies.
   /// @throws InvalidArgument, as do all functions of joints, for an unknown id or a field out of
   ///   its range; if both bodies are the same or have mass 0; if the solver is worst_first
   JointId add_joint(const Joint& joint);
@@ -236,8 +236,8 @@ class JFPX_API World {
   /// Replaces a joint by one of the same type and bodies, for example with another length or
   /// another spring. Wakes its bodies.
   void set_joint(JointId id, const Joint& joint);
-  /// The joint after the last step: its length is that of the present states of the bodies, its
-  /// force that of the last step.
+  /// The joint after the last step. The length is computed from the current states of the bodies;
+  /// the force is that of the last step.
   JointState joint_state(JointId id) const;
 
   /// Applies a force [N] at the centre of mass or at a point in the world [m], or a torque [N m],
@@ -248,11 +248,11 @@ class JFPX_API World {
   void apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point);
   void apply_torque(BodyId id, const Vec3& torque);
 
-  /// Adds a force that acts in every step, either one of force.hpp or a user's own; wakes all
+  /// Adds a force that acts in every step, either one of force.hpp or a user-defined one; wakes all
   /// bodies. Forces act in the order of their addition. A force of force.hpp has no effect after
   /// its body is removed. A force must not call its World. In a world on a GPU, forces of force.hpp
-  /// act there; with a user's own, each step copies the motion of all bodies to the host.
-  /// @throws InvalidArgument if a force of force.hpp has a bad field or an unknown body
+  /// act there; with a user-defined force, each step copies the motion of all bodies to the host.
+  /// @throws InvalidArgument if a force of force.hpp has an invalid field or an unknown body
   template <Force F>
   ForceId add_force(F force) {
     if constexpr (CheckedForce<F>) force.validate(force_context());
@@ -291,41 +291,41 @@ class JFPX_API World {
   /// Generators in the order in which they act. Valid until one is added or removed.
   std::span<const ContactGeneratorId> contact_generators() const;
 
-  /// The first hit of a ray; of bodies at the same distance, the one with the lowest index. Queries
-  /// find all bodies, including sleeping and immovable ones and sensors, whatever their collision
-  /// filters. They use a bounding-volume tree and take O(log bodies) time for usual scenes, plus
-  /// the time of the results. The first query after a step, and after a body was added, removed or
-  /// moved by set_state(), builds the tree in O(bodies) time, about 20 ns per body; concurrent
-  /// queries wait for it. Half-spaces and planes are not in the tree and are always tested.
+  /// The first hit of a ray; among bodies at the same distance, the one with the lowest index.
+  /// Queries include sleeping and immovable bodies and sensors, and ignore collision filters. They
+  /// use a bounding-volume tree and take O(log bodies) time for usual scenes, plus the time of the
+  /// results. The first query after a step, and after a body was added, removed or moved by
+  /// set_state(), builds the tree in O(bodies) time, about 20 ns per body; concurrent queries wait
+  /// for it. Half-spaces and planes are not in the tree and are always tested.
   /// @throws InvalidArgument for a field of the ray that is out of its range; std::bad_alloc
   std::optional<RayHit> cast_ray(const Ray& ray, const BodyFilter& filter = {}) const;
   /// All hits of a ray, sorted by distance, then by index; one hit per body.
   /// @throws as cast_ray()
   std::vector<RayHit> cast_ray_through(const Ray& ray, const BodyFilter& filter = {}) const;
-  /// Bodies that overlap a sphere or a box, in the order of bodies(). An exact touch counts, as for
-  /// contacts, and the arithmetic is that of contacts.
-  /// @throws InvalidArgument for a size, position or orientation that no body could have;
+  /// Bodies that overlap a sphere or a box, in the order of bodies(). Exact contact counts; the
+  /// arithmetic is that of contacts().
+  /// @throws InvalidArgument for a size, position or orientation that is invalid for a body;
   ///   std::bad_alloc
   std::vector<BodyId> overlapping(const Sphere& sphere, const Vec3& centre) const;
   std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
                                   const Quat& orientation = {}) const;
 
-  /// Everything that the following steps depend on, as a value: bodies, joints, ids, ignored pairs,
-  /// settings, sleep, accumulated forces, contacts with their impulses, and forces of force.hpp. A
-  /// function of the state alone. User-defined forces and contact generators are recorded by id.
+  /// Copies all data that affect the following steps: bodies, joints, ids, ignored pairs, settings,
+  /// sleep, accumulated forces, contacts with their impulses, and forces of force.hpp. Depends on
+  /// the state only. User-defined forces and contact generators are recorded by id.
   /// @throws OutOfMemory, DeviceError
   Snapshot snapshot() const;
-  /// Replaces the state. All following steps have the bits of those after snapshot(), on any
-  /// machine, whatever the WorldSettings and the previous state of this world. Spans and references
-  /// of this world become invalid. Ids are those of the snapshot; later ones are unknown and will
-  /// be given again. contacts() are those of the snapshot; contact_events() is empty until the next
-  /// step, which has the same events as without the restoration.
+  /// Replaces the state. All following steps have the bits of the steps after snapshot(), on any
+  /// machine, regardless of the WorldSettings and the previous state of this world. Spans and
+  /// references of this world become invalid. Ids are those of the snapshot; later ids become
+  /// unknown and will be reused. contacts() are those of the snapshot. contact_events() is empty
+  /// until the next step, which has the same events as without the restoration.
   ///
   /// Forces of force.hpp are restored with their parameters; references from force() remain valid
-  /// if the snapshot has a force of the same id and type. Functions of the program are not in a
-  /// snapshot: this world must have user-defined forces and contact generators with the same ids,
-  /// which remain as they are. A world of another process has them if it has added all forces and
-  /// generators in the same order.
+  /// if the snapshot has a force of the same id and type. User-defined forces and contact
+  /// generators are not stored: this world must have them with the same ids, and they are
+  /// unchanged. Another process has the same ids if it has added all forces and generators in the
+  /// same order.
   /// @throws InvalidSnapshot if the bytes are not of snapshot() in this format and precision, or
   ///   the user-defined callbacks differ; OutOfMemory; InvalidArgument without thesis::enable().
   ///   The world is then unchanged.
@@ -333,26 +333,26 @@ class JFPX_API World {
 
   std::uint64_t steps() const;  ///< number of completed steps, without undone ones
   double time() const;          ///< [s], completed steps times dt
-  /// Contacts of the last step: those at its start, and with Solver::soft_step also those of bodies
-  /// that met during the step and pushed each other. Three consecutive lists:
+  /// Contacts of the last step: those at its start, and with Solver::soft_step also those that
+  /// began during the step and pushed the bodies apart. Three consecutive lists:
   ///   - contacts of two spheres (bodies or parts of compounds), sorted by (a.index, b.index);
   ///   - other detected contacts, in the same order;
-  ///   - contacts of contact generators, in the order of the generators.
-  /// Detected contacts with the same a and b are sorted by the part of a, then by the part of b,
-  /// spheres before boxes; contact points of the same two parts are in the order in which their
-  /// pair test returns them. Those that began during the step follow. Empty after a failed
-  /// step, and after bodies were added or removed. Valid until a body is added or removed, or until
-  /// the next step. The first call after a step makes the list.
+  ///   - contacts of contact generators, in the order of the generators. Detected contacts with the
+  ///   same a and b are sorted by the part of a, then by the part of b, spheres before boxes;
+  ///   contact points of the same two parts have the order of their pair test. Contacts that began
+  ///   during the step follow. Empty after a failed step, and after bodies were added or removed.
+  ///   Valid until a body is added or removed, or until the next step. The first call after a step
+  ///   builds the list.
   /// @throws std::bad_alloc
   std::span<const Contact> contacts() const;
-  /// Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step.
-  /// Contacts of contact generators have no events. Sorted by (a.index, b.index); where a new body
-  /// has the index of an old one, the end event of the old pair comes first. An event describes the
-  /// contact as contacts() does, an end event as that of the step before did. Sleeping bodies stay
-  /// in contact. The contacts of a removed body end in the next step. The list is empty after a
-  /// failed step; the next successful step compares with the last successful one.
-  /// Valid until the next step, even if bodies are added or removed while the list is read. The
-  /// first call after a step computes the list.
+  /// Begin, stay and end events of the pairs of bodies in the last step. Contacts of contact
+  /// generators have no events. Sorted by (a.index, b.index); if a new body reuses the index of a
+  /// removed one, the end event of the old pair comes first. Begin and stay events have the values
+  /// of contacts(), end events those of contacts() after the step before. Sleeping bodies stay in
+  /// contact. The contacts of a removed body end in the next step. The list is empty after a failed
+  /// step; the next successful step compares with the last successful one. Valid until the next
+  /// step, even if bodies are added or removed while the list is read. The first call after a step
+  /// computes the list.
   /// @throws std::bad_alloc
   std::span<const ContactEvent> contact_events() const;
   /// state_hash() of states().

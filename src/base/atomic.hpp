@@ -1,5 +1,4 @@
-/// Atomic operations, without an order of other memory accesses, of code that runs on threads of
-/// the host and of devices.
+/// Relaxed atomic operations for code that runs on threads of the host and of devices.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -84,7 +83,7 @@ JFPX_HD inline std::uint32_t atomic_exchange_if(std::uint32_t* at, std::uint32_t
 #endif
 }
 
-/// A load that observes the writes of other threads during the same loop.
+/// Loads an item that other threads write during the same loop.
 JFPX_HD inline std::uint32_t load_shared(const std::uint32_t* at) {
 #if defined(__CUDA_ARCH__)
   return *static_cast<const volatile std::uint32_t*>(at);
@@ -93,7 +92,7 @@ JFPX_HD inline std::uint32_t load_shared(const std::uint32_t* at) {
 #endif
 }
 
-/// A store to an item that other threads read or write during the same loop.
+/// Stores an item that other threads read or write during the same loop.
 JFPX_HD inline void store_shared(std::uint8_t* at, std::uint8_t value) {
 #if defined(__CUDA_ARCH__)
   *static_cast<volatile std::uint8_t*>(at) = value;

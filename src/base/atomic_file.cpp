@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// True if the path exists and is no regular file, so that renaming a file over it would destroy
+/// True if the path exists and is not a regular file, so that renaming a file to it would destroy
 /// it.
 bool is_special(const std::string& path) {
   std::error_code ignored;

@@ -22,7 +22,7 @@ class JFPX_API AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// @throws FileError; all later calls throw too, because part of the content may be missing
+  /// @throws FileError; all later calls also throw, because part of the content may be missing
   void write(std::string_view bytes);
   /// Completes the file. No call of write() may follow. @throws FileError
   void finish();
@@ -33,7 +33,7 @@ class JFPX_API AtomicFile {
 
   std::string path_;
   std::string target_;  ///< path_ with symbolic links resolved
-  std::string part_;    ///< path of the temporary file; target_ itself if that is no regular file
+  std::string part_;    ///< path of the temporary file; target_ if that is not a regular file
   std::FILE* file_;
   bool finished_ = false, failed_ = false;
 };

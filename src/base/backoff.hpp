@@ -11,15 +11,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Waiting for other threads, which may be waiting for a processor themselves: spins first, then
-/// yields, for a limited time or without end.
+/// Waits for other threads, which may be waiting for a processor themselves: spins first, then
+/// yields, for a limited or unlimited time.
 class Backoff {
  public:
-  /// @param endless without it the wait ends after some tens of microseconds on a free processor,
-  ///   and after some time slices of other threads on a busy one
+  /// @param endless if false, the wait ends after some tens of microseconds on a free processor,
+  /// and
+  ///   after some time slices of other threads on a busy processor
   explicit Backoff(bool endless) : endless_(endless) {}
 
-  /// Waits a moment. @return false when the limit is reached
+  /// Waits briefly. @return false when the limit is reached
   bool wait() {
     if (waits_ < kSpins) {
       pause();

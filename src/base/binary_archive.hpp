@@ -27,8 +27,8 @@ template <class T>
 concept Scalar = (std::is_arithmetic_v<T> ||
                   std::is_enum_v<T>)&&!std::same_as<std::remove_const_t<T>, bool>;
 
-// A function serialize(archive, value) that Is<T> constrains describes the bytes of a type for all
-// archives, which call it for values that are neither numbers nor enumerations.
+// A function serialize(archive, value), constrained by Is<T>, defines the bytes of a type for all
+// archives. Archives call it for values other than numbers and enumerations.
 
 /// Appends values to a sequence of bytes.
 class BinaryWriter {
@@ -68,7 +68,7 @@ class BinaryWriter {
     size_ += sizeof value;
   }
 
-  std::vector<std::byte> bytes_;  ///< longer than the written part
+  std::vector<std::byte> bytes_;  ///< capacity; the written part is shorter
   std::size_t size_ = 0;
 };
 
@@ -93,8 +93,8 @@ class BinarySize {
   std::size_t size_ = 0;
 };
 
-/// Reads values that a BinaryWriter has written. Accepts any bytes: what cannot have been written
-/// is an InvalidSnapshot.
+/// Reads values of a BinaryWriter. Accepts any bytes: bytes that no BinaryWriter produces cause an
+/// InvalidSnapshot.
 class BinaryReader {
  public:
   explicit BinaryReader(std::span<const std::byte> bytes) : left_(bytes) {}
@@ -121,8 +121,8 @@ class BinaryReader {
   static void require(bool holds, const char* otherwise) {
     if (!holds) fail(otherwise);
   }
-  /// Reads a number of values, and checks that so many can follow, so that memory for them may be
-  /// allocated. @param least number of bytes of a value
+  /// Reads a number of values, and checks that the remaining bytes can contain them, so that memory
+  /// may be allocated. @param least minimum number of bytes of a value
   std::size_t count(std::size_t least) {
     const auto count = get<std::uint64_t>();
     if (count > left() / least) fail("it ends too early");
@@ -152,7 +152,7 @@ class BinaryReader {
   std::span<const std::byte> left_;
 };
 
-/// Number of bytes of a default value, which no value of a type with optional parts falls below.
+/// Number of bytes of a default value: the minimum for types with optional parts.
 template <class T>
 std::size_t least_size() {
   BinarySize size;

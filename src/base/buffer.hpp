@@ -15,8 +15,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Elements are trivially copyable and not initialized. Growing discards the contents, apart from
-/// the elements to be kept.
+/// Elements are trivially copyable and not initialized. Growing discards the contents, except
+/// elements that reserve() is told to keep.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -51,7 +51,7 @@ class Buffer {
     return data_;
   }
 
-  /// As reserve(), but the capacity grows geometrically, by an eighth. Discards the contents.
+  /// reserve() with geometric growth, by an eighth. Discards the contents.
   void reserve_geometric(std::size_t count, const char* purpose) {
     if (count > capacity_) reserve(std::max(count, capacity_ + capacity_ / 8), purpose);
   }

@@ -1,4 +1,4 @@
-/// The library's side of the link-time check.
+/// Library part of the link-time check.
 #include <jfpx/build.hpp>
 
 namespace jfpx {

@@ -1,4 +1,4 @@
-/// Starts a device on another thread when that pays.
+/// Start of a device on another thread when it pays off.
 #pragma once
 
 #include <jfpx/error.hpp>
@@ -20,11 +20,11 @@ inline namespace JFPX_ABI {
 template <class Device>
 class DeviceStarter {
  public:
-  /// What an attempt to start has led to.
+  /// Outcome of a start.
   struct Outcome {
     Device device{};
     bool has_failed = false;
-    std::string failure{};  ///< empty also if there is no device, which is not a failure
+    std::string failure{};  ///< also empty if there is no device, which is not a failure
   };
 
   /// @param cost_us [us] of a start; 0: take() starts the device in the calling thread
@@ -34,9 +34,9 @@ class DeviceStarter {
   /// at most twice as much as the optimal decision made in hindsight.
   /// @param missed_us [us] that the device would have saved so far
   bool is_due(double missed_us) const { return !is_started_ && missed_us >= cost_us_; }
-  /// No start is due any more.
+  /// Disables later starts.
   void cancel() noexcept { is_started_ = true; }
-  /// Starts the device. @param make returns it, after its first call if that takes longer
+  /// Starts the device. @param make returns the device, after its first call if that is slow
   template <class Make>
   void start(Make make) {
     is_started_ = true;
@@ -49,7 +49,7 @@ class DeviceStarter {
       starting_ = unavailable();
     }
   }
-  /// The outcome of start(), once, as soon as there is one.
+  /// Returns the outcome of start() once, as soon as it is available.
   std::optional<Outcome> take() {
     if (!starting_.valid()) return std::nullopt;
     if (starting_.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) {
@@ -73,7 +73,7 @@ class DeviceStarter {
 
   double cost_us_;
   bool is_started_ = false;
-  std::future<Device> starting_;  ///< valid from start() until take() has returned its outcome
+  std::future<Device> starting_;  ///< valid from start() until take() returns the outcome
 };
 
 }  // namespace JFPX_ABI

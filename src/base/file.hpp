@@ -9,7 +9,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// The text "PATH: WHAT: REASON", for FileError. The reason is that of `error_number`, a value of
+/// The text "PATH: WHAT: REASON", for FileError. The reason describes `error_number`, a value of
 /// errno.
 JFPX_API std::string file_message(const std::string& path, std::string_view what, int error_number);
 

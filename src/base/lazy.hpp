@@ -1,4 +1,4 @@
-/// Values that are computed by the first call that needs them.
+/// Lazily computed values.
 #pragma once
 
 #include <atomic>
@@ -8,7 +8,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A value that const functions of its owner compute when they need it. get() and copies may run
+/// A value that const functions of its owner compute on demand. get() and copies may run
 /// concurrently with each other; the other functions exclude all calls.
 template <class T>
 class Lazy {
@@ -32,13 +32,13 @@ class Lazy {
 
   /// The next get() computes the value.
   void invalidate() noexcept { is_current_.store(false, std::memory_order_relaxed); }
-  /// The value, for an owner that keeps it up to date, or null after invalidate().
+  /// The value, for an owner that updates it in place; null after invalidate().
   T* current() noexcept { return is_current_.load(std::memory_order_relaxed) ? &value_ : nullptr; }
-  /// The value, current or not, so that its owner can fill it before get() computes the rest.
+  /// The value, current or not, so that the owner can fill parts of it before get().
   T* storage() noexcept { return &value_; }
 
   /// Calls compute(T*) after invalidate(), and returns the value. Takes a lock only to compute.
-  /// @throws what compute() throws; the next call then tries again
+  /// @throws the exceptions of compute(); the next call then tries again
   template <class Compute>
   const T& get(const Compute& compute) const {
     if (!is_current_.load(std::memory_order_acquire)) {

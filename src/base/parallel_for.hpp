@@ -10,8 +10,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Calls body(first, last) for the chunks of [0, count), of `chunk` items each but the last one,
-/// from any thread and in any order. The chunks do not depend on the number of threads.
+/// Calls body(first, last) for the chunks of [0, count), from any thread and in any order. All
+/// chunks but the last have `chunk` items; they do not depend on the number of threads.
 /// @param pool null: one chunk in the calling thread
 template <class Body>
 void parallel_for(ThreadPool* pool, std::size_t count, std::size_t chunk, const Body& body) {
@@ -24,8 +24,8 @@ void parallel_for(ThreadPool* pool, std::size_t count, std::size_t chunk, const 
 }
 
 /// Combines `identity` and the results of body(first, last) for the chunks of [0, count), in any
-/// order: combine(x, y) must be associative and commutative for the values that occur. Minima and
-/// maxima are so apart from the sign of zero, sums of floating-point numbers are not.
+/// order: combine(x, y) must be associative and commutative for the occurring values. Minima and
+/// maxima are, except for the sign of zero; sums of floating-point numbers are not.
 /// @param pool null: one chunk in the calling thread
 template <class Value, class Body, class Combine>
 Value parallel_reduce(ThreadPool* pool, std::size_t count, std::size_t chunk, const Value& identity,

@@ -1,4 +1,4 @@
-/// Instruction for loops that poll.
+/// Pause instruction for polling loops.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -6,8 +6,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Leaves the core to its other hardware threads for some cycles. On ARM64, `yield` does nothing on
-/// most cores; `isb` flushes the pipeline, which takes about as long as x86-64's `pause`.
+/// Yields the core to its other hardware threads for some cycles. On most ARM64 cores, `yield` has
+/// no effect; `isb` flushes the pipeline, which takes about as long as x86-64's `pause`.
 inline void pause() {
 #if defined(__x86_64__)
   __builtin_ia32_pause();

@@ -1,4 +1,4 @@
-/// The threads of a pool as a team, as the threads of a cooperative launch on a device.
+/// The threads of a pool as a team, like the threads of a cooperative launch on a device.
 #pragma once
 
 #include "src/base/parallel_for.hpp"
@@ -22,7 +22,7 @@ class PoolTeam {
       for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) f(i);
     });
   }
-  /// The same. On a device it does not wait.
+  /// Same as for_each(); on a device, it does not wait.
   template <class F>
   void for_each_nowait(std::uint32_t n, const F& f) const {
     for_each(n, f);

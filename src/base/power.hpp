@@ -39,9 +39,9 @@ JFPX_HD inline double exponential(double x) {
   return ::ldexp(series, static_cast<int>(n));
 }
 
-/// base^exponent for base in (0, 1] and exponent >= 0: the fraction of a quantity that remains
-/// after `exponent` seconds if the fraction `base` remains after one. Replaces std::pow, whose last
-/// bit differs between C libraries, because a damping factor affects every state. The relative
+/// base^exponent for base in (0, 1] and exponent >= 0: the remaining fraction of a quantity after
+/// `exponent` seconds if the fraction `base` remains after one second. Replaces std::pow, whose
+/// last bit differs between C libraries, because a damping factor affects every state. The relative
 /// error is below 1e-15 * (1 + |exponent * ln(base)|).
 JFPX_HD inline double power(double base, double exponent) {
   return exponential(exponent * natural_logarithm(base));

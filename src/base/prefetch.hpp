@@ -8,8 +8,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Prefetches the cache line of `address` into the L2 cache. The address may be invalid. The L1
-/// cache is not the target, because its few line-fill buffers are exhausted when lines come from
-/// memory, and the next request would stall.
+/// cache is not used, because its few line-fill buffers are exhausted by lines from memory, and the
+/// next request would stall.
 ///
 /// Uses inline assembly instead of __builtin_prefetch: GCC treats a function that contains only
 /// __builtin_prefetch as free of side effects and silently removes calls that were not inlined.
@@ -21,8 +21,8 @@ inline namespace JFPX_ABI {
 #endif
 }
 
-/// Prefetches the cache line of `address` for writing, also from the cache of another core, which
-/// loses it: a later store then need not wait for the line. The address may be invalid. Processors
+/// Prefetches the cache line of `address` for writing and removes it from the caches of other
+/// cores, so that a later store need not wait for the line. The address may be invalid. Processors
 /// with AVX2 have the instruction, or ignore it.
 [[gnu::always_inline]] inline void prefetch_for_write(const void* address) {
 #if defined(__x86_64__)

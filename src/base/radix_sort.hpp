@@ -10,8 +10,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Sorts in chunks whose bounds depend on the number of items alone. The sort is stable, so the
-/// permutation is the same for any number of threads.
+/// Sorts in chunks whose bounds depend only on the number of items. The sort is stable, so the
+/// permutation does not depend on the number of threads.
 class RadixSorter {
  public:
   /// Sorts by the bits [low, low + bits) of key(item), and overwrites both `items` and `spare`.

@@ -1,5 +1,5 @@
-/// Vectors of 128 bits, with the instructions that every processor of an architecture supports:
-/// SSE2 on x86-64, NEON on ARM64.
+/// Vectors of 128 bits in the baseline instruction set of the architecture: SSE2 on x86-64, NEON on
+/// ARM64.
 #pragma once
 
 #include <jfpx/config.hpp>

@@ -28,8 +28,8 @@ SineCosine sine_cosine_near_zero(double x) {
 }
 
 /// Errors of a few 10^-16 for |x| <= kMaxAngle. Cody and Waite, "Software Manual for the Elementary
-/// Functions": pi/2 is subtracted in three parts, the first two of which have 33 bits, so that
-/// their products with the number of quarters are exact.
+/// Functions": subtracts pi/2 in three parts. The first two parts have 33 bits, so that their
+/// products with the number of quarters are exact.
 SineCosine sine_cosine(double x) {
   constexpr double kPart1 = 0x1.921fb544p+0, kPart2 = 0x1.0b4611a6p-34,
                    kPart3 = 0x1.3198a2e037073p-69, kQuartersPerRadian = 0x1.45f306dc9c883p-1;

@@ -1,4 +1,4 @@
-/// Sanitizers that this build runs under.
+/// Sanitizers of this build.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -6,7 +6,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-// GCC defines a macro; clang 14 answers __has_feature.
+// GCC defines a macro; clang 14 supports __has_feature.
 #if defined(__has_feature)
 #define JFPX_HAS_FEATURE(name) __has_feature(name)
 #else

@@ -1,4 +1,4 @@
-/// Order of bounding boxes for trees that pack consecutive ones.
+/// Order of bounding boxes for trees that pack consecutive boxes.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -11,14 +11,14 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Order by size class, then along a Morton curve. A large box among small ones would enlarge their
-/// block, so the boxes above a multiple of the median size have blocks of their own. The curve
-/// fills a grid of 1024^3 cells around the middle seven eighths of the boxes; the others are in the
-/// outermost cells, so that a box that has left the scene does not make the cells too large.
+/// Order by size class, then along a Morton curve. A large box among small ones would enlarge its
+/// block, so boxes above a multiple of the median size have separate blocks. The curve fills a grid
+/// of 1024^3 cells around the middle seven eighths of the boxes. All other boxes are in the
+/// outermost cells, so that a box that has left the scene does not enlarge the cells.
 class SpatialOrder {
  public:
-  /// @param sample largest number of boxes, at most 256, from which sizes and cells are derived
-  /// @param bounds_of function from the number of a box to its bounds; infinite ones are allowed
+  /// @param sample largest number of boxes, at most 256, that determine sizes and cells
+  /// @param bounds_of function from the number of a box to its bounds, which may be infinite
   template <class BoundsOf>
   SpatialOrder(std::size_t count, std::size_t sample, const BoundsOf& bounds_of) {
     const std::size_t size = std::min(count, sample);
@@ -28,7 +28,7 @@ class SpatialOrder {
     const auto sort_values = [&](const auto& quantity) {
       for (std::size_t i = 0; i < size; ++i) {
         const Real value = quantity(boxes[i]);
-        values[i] = value == value ? value : Real(0);  // NaN is the sum of opposite infinities
+        values[i] = value == value ? value : Real(0);  // the sum of opposite infinities is NaN
       }
       std::sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(size));
     };
@@ -53,7 +53,7 @@ class SpatialOrder {
     for (int i = 0; i < 3; ++i) code += size > limit_[i] ? 1u << 30 : 0u;
     for (int i = 0; i < 3; ++i) {
       const Real cell = (bounds.lower[i] + bounds.upper[i] - begin_[i]) * scale_[i];
-      // Also correct for infinity and NaN, which an overflow may cause.
+      // Also correct for infinity and NaN after an overflow.
       const Real inside = !(cell > 0) ? Real(0) : !(cell < 1023) ? Real(1023) : cell;
       code += spread(static_cast<std::uint32_t>(inside)) << i;
     }

@@ -14,9 +14,9 @@ class Stopwatch {
  public:
   /// Ends the lap, and starts the next one. @returns the duration of the lap [s]
   double lap() { return end_lap<std::ratio<1>>(); }
-  /// As lap(), in [ms].
+  /// lap() in [ms].
   double lap_ms() { return end_lap<std::milli>(); }
-  /// As lap(), in [us].
+  /// lap() in [us].
   double lap_us() { return end_lap<std::micro>(); }
 
  private:

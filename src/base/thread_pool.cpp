@@ -26,19 +26,19 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Some tens of microseconds.
+/// Polls before a worker sleeps: some tens of microseconds.
 constexpr unsigned kPolls = 2000;
 /// Longer than most serial parts between two loops of a step of ten thousand bodies.
 constexpr auto kLongWait = std::chrono::milliseconds(1);
-/// A thread that polls takes longer than this between two looks at the clock only if it has lost
-/// its core.
+/// If the time between two clock reads of a polling thread exceeds this, the thread was
+/// descheduled.
 constexpr auto kInterruption = std::chrono::microseconds(500);
-/// For so long after an interruption, workers do not poll for long: they would take cores from
-/// threads that have work.
+/// Time after an interruption in which workers poll only briefly: longer polling would take cores
+/// from threads with work.
 constexpr auto kCrowded = std::chrono::milliseconds(50);
 constexpr std::uint64_t kChunksLeft = 0xffffffffu;
-/// A thread takes this part of the chunks that are left, and so many at most: a thread that loses
-/// its core delays the loop by its portion.
+/// A thread takes this fraction of the remaining chunks, up to a limit: a descheduled thread delays
+/// the loop by its portion.
 constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
 
 }  // namespace
@@ -46,17 +46,17 @@ constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
 /// Threads that run the loops of one or several pools, one loop at a time.
 class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
  public:
-  /// Those of an existing pool that the calling thread has created with as many threads, or new
-  /// ones. @throws std::bad_alloc
+  /// The workers of an existing pool of the calling thread with as many threads, or new workers.
+  /// @throws std::bad_alloc
   static std::shared_ptr<Workers> shared(unsigned threads);
 
-  /// @param threads including the thread that calls run()
+  /// @param threads including the calling thread of run()
   explicit Workers(unsigned threads);
   ~Workers();
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  /// Including the thread that calls run().
+  /// Including the calling thread of run().
   unsigned threads() const noexcept { return thread_count_; }
   /// Number of threads that were requested.
   unsigned requested() const noexcept { return requested_; }
@@ -68,7 +68,7 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   std::exception_ptr run(const Loop& loop);
 
  private:
-  /// Part of a loop, with at most as many chunks as a ticket can count.
+  /// Part of a loop, limited to the number of chunks that a ticket can count.
   struct Job {
     Loop loop;
     std::size_t first = 0;      ///< number of the first chunk
@@ -76,7 +76,7 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   };
   /// Chunks of a thread.
   struct alignas(64) Ticket {
-    /// Number of the job in the upper half, number of chunks that are not taken in the lower half.
+    /// Number of the job in the upper half, number of remaining chunks in the lower half.
     std::atomic<std::uint64_t> value{0};
   };
 
@@ -89,23 +89,24 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   void run_chunks(std::size_t first, std::uint32_t count);
   std::size_t first_chunk(unsigned owner) const;
 
-  /// Workers that pools may share. Both are trivially destructible, because pools may be static.
+  /// Workers that pools may share. Both members are trivially destructible, because pools may be
+  /// static.
   static constinit std::mutex list_mutex_;
   static constinit Workers* list_;
   Workers* next_ = nullptr;
   std::thread::id creator_ = std::this_thread::get_id();
 
-  /// The job that runs. A thread may read it only after it has taken a chunk, and until that chunk
-  /// is done, because the next job overwrites it.
+  /// The current job. A thread may read it only between taking a chunk and completing it, because
+  /// the next job overwrites it.
   Job job_;
   unsigned requested_, thread_count_ = 1;
-  unsigned polls_ = 0;                 ///< number of times that a worker polls before it sleeps
+  unsigned polls_ = 0;                 ///< number of polls before a worker sleeps
   std::unique_ptr<Ticket[]> tickets_;  ///< by thread; 0 is the caller
   std::atomic<bool> busy_{false};
   /// Since the epoch of the clock.
   std::atomic<Clock::duration> crowded_until_{Clock::duration::zero()};
   alignas(64) std::atomic<std::uint32_t> number_{0};  ///< of the last job
-  alignas(64) std::atomic<std::uint32_t> done_{0};    ///< chunks of the job that are complete
+  alignas(64) std::atomic<std::uint32_t> done_{0};    ///< completed chunks of the job
   std::atomic<bool> stopped_{false};
 
   std::mutex error_mutex_;
@@ -121,7 +122,7 @@ std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::shared(unsigned thread
   const std::lock_guard lock(list_mutex_);
   for (Workers* known = list_; known != nullptr; known = known->next_) {
     if (known->creator_ != std::this_thread::get_id() || known->requested_ != threads) continue;
-    // Null if another thread destroys the last pool.
+    // Null if another thread is destroying the last pool.
     if (auto workers = known->weak_from_this().lock()) return workers;
   }
   auto workers = std::make_shared<Workers>(threads);
@@ -130,7 +131,7 @@ std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::shared(unsigned thread
 }
 
 ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
-  // A worker that polls must not take the core of another thread.
+  // A polling worker must not take the core of another thread.
   if (threads <= std::thread::hardware_concurrency()) polls_ = kPolls;
   tickets_ = std::make_unique<Ticket[]>(threads);
   workers_.reserve(threads - 1);
@@ -140,7 +141,8 @@ ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
       ++thread_count_;
     }
   } catch (const std::exception&) {
-    // Results do not depend on the number of threads, so the pool works with those that started.
+    // Results do not depend on the number of threads, so the pool uses the threads that have
+    // started.
   }
 }
 
@@ -162,7 +164,7 @@ ThreadPool::Workers::~Workers() {
 std::exception_ptr ThreadPool::Workers::run(const Loop& loop) {
   Job job;
   std::fegetenv(&job.environment);
-  // Loops over more chunks than a ticket can count run in parts.
+  // Loops with more chunks than a ticket can count are split.
   constexpr std::size_t kMaxChunks = 0xffffffffu;
   for (job.first = 0; job.first < loop.chunks; job.first += kMaxChunks) {
     job.loop = loop;
@@ -183,8 +185,8 @@ void ThreadPool::Workers::run_job(const Job& job) {
   number_.store(number);
   number_.notify_all();
   take_chunks(0);
-  // Workers that have taken no chunk are not waited for: on a loaded machine that would take longer
-  // than the loop.
+  // Does not wait for workers without a chunk: on a loaded machine that would take longer than the
+  // loop.
   const auto chunks = static_cast<std::uint32_t>(job.loop.chunks);
   for (unsigned i = 0;; ++i) {
     const std::uint32_t done = done_.load(std::memory_order_acquire);
@@ -233,17 +235,17 @@ std::size_t ThreadPool::Workers::first_chunk(unsigned owner) const {
   return job_.loop.chunks * owner / thread_count_;
 }
 
-/// Takes the chunks of thread `self`, then those that other threads have left.
+/// Takes the chunks of thread `self`, then remaining chunks of other threads.
 void ThreadPool::Workers::take_chunks(unsigned self) {
-  std::uint32_t prepared = 0;  // number of the job whose environment the thread has
+  std::uint32_t prepared = 0;  // number of the job whose environment is set
   for (unsigned i = 0; i < thread_count_; ++i) {
     take_chunks_of((self + i) % thread_count_, self > 0, &prepared);
   }
 }
 
-/// Takes a portion of the chunks that are left at a time, so that threads access shared counters
-/// seldom, and still end at the same time (guided self-scheduling, Polychronopoulos and Kuck 1987).
-/// @param is_worker whether the thread must take over the floating-point environment of the caller
+/// Takes a portion of the remaining chunks at a time, so that threads rarely access shared counters
+/// and still end at the same time (guided self-scheduling, Polychronopoulos and Kuck 1987).
+/// @param is_worker whether the thread must copy the floating-point environment of the caller
 void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared) {
   std::atomic<std::uint64_t>& value = tickets_[owner].value;
   std::uint64_t ticket = value.load();

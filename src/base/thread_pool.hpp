@@ -1,5 +1,5 @@
-/// Thread pool that runs the chunks of a loop. Chunk bounds must depend on the problem alone, never
-/// on the number of threads, because the assignment of chunks to threads is unspecified.
+/// Thread pool that runs the chunks of a loop. Chunk bounds must not depend on the number of
+/// threads, because the assignment of chunks to threads is unspecified.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,24 +10,24 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// The calling thread takes part in each loop. Every thread begins with chunks of its own, which
-/// are consecutive and the same in equal loops, so that caches keep their data; then it takes
-/// chunks of the others. Worker threads poll for the next loop, so that consecutive loops start
-/// without a system call, and then sleep: after a millisecond, or after some tens of microseconds
-/// where other threads need the cores. A pool runs one loop at a time: run() must not be called
-/// concurrently or from within a loop.
+/// The calling thread takes part in each loop. Every thread starts with its own consecutive chunks,
+/// which are the same in equal loops, so that caches keep their data; then it takes chunks of other
+/// threads. Worker threads poll for the next loop, so that consecutive loops start without a system
+/// call, and then sleep: after a millisecond, or after some tens of microseconds if other threads
+/// need the cores. A pool runs one loop at a time: run() must not be called concurrently or from
+/// within a loop.
 ///
-/// Pools of equal size that one thread creates share their workers, so that the parts of a step
-/// that follow each other keep the same threads awake. A pool whose loop begins while another pool
-/// uses these workers receives workers of its own. Workers end with the last of their pools.
+/// Pools of equal size that one thread creates share their workers, so that consecutive parts of a
+/// step keep the same threads awake. If another pool is using the shared workers when a loop
+/// begins, the pool gets its own workers. Workers end with the last of their pools.
 class JFPX_API ThreadPool {
  public:
   static constexpr unsigned kMaxThreads = 256;
   /// @throws InvalidArgument if `threads` exceeds kMaxThreads.
   static void check(unsigned threads);
 
-  /// @param threads number of threads, including the caller's; 0: one per core. The pool has fewer
-  ///   if the system refuses to start them.
+  /// @param threads number of threads, including the caller's; 0: one per core. The pool is smaller
+  ///   if the system refuses to start threads.
   /// @throws InvalidArgument if `threads` exceeds kMaxThreads.
   explicit ThreadPool(unsigned threads);
   ~ThreadPool();
@@ -39,7 +39,7 @@ class JFPX_API ThreadPool {
 
   /// Calls body(chunk) for every chunk in [0, chunks), in any order and from any thread, and
   /// returns after the last call. If several chunks throw, rethrows the exception of the lowest
-  /// one. Throws nothing else, even if there is no memory for workers. Worker threads take over the
+  /// one. Throws no other exceptions, even if workers cannot be allocated. Worker threads use the
   /// floating-point environment of the calling thread (rounding mode, flush-to-zero,
   /// denormals-are-zero).
   template <class Body>

@@ -12,17 +12,17 @@ namespace {
 constexpr double kMinPredictedUs = 1e-3;
 /// Hysteresis: an alternative replaces the incumbent only if its time is below this fraction.
 constexpr double kClearly = 0.93;
-/// Calls that are not counted when an alternative first runs at a size, because its buffers grow.
+/// Uncounted calls when an alternative first runs at a size, because its buffers grow.
 constexpr int kColdCalls = 2;
-/// Minimum number of calls before the next switch: the cold calls, and three that count.
+/// Minimum number of calls before the next switch: the cold calls, and three counted calls.
 constexpr int kCallsToSettle = kColdCalls + 3;
 /// Minimum duration of a trial, because a processor that waited for a GPU is slow at first. A trial
-/// also takes at least kCallsToSettle calls.
+/// also has at least kCallsToSettle calls.
 constexpr double kTrialUs = 300;
-/// Alternatives that are both predicted and measured to take this many times as long are not tried.
+/// Alternatives whose predicted and measured times are both this many times longer are not tried.
 constexpr double kTrialRatio = 2;
-/// A trial whose result is within the factor kClose is prolonged by the factor kLonger. This costs
-/// little, because the times are close. A processor that waited for a GPU takes about a millisecond
+/// A trial whose result is within the factor kClose is prolonged by the factor kLonger. The cost is
+/// small, because the times are close. A processor that waited for a GPU takes about a millisecond
 /// to reach its full speed.
 constexpr double kClose = 1.2;
 constexpr int kLonger = 4;
@@ -30,8 +30,8 @@ constexpr int kLonger = 4;
 /// wastes half of its time, which is 2 % of the total.
 constexpr double kTrialsBetween = 25;
 constexpr double kMaxPatience = 16;
-/// A decision and its time measurement take 0.1 us, or several us where reading the clock is a
-/// system call. Therefore short calls share a decision.
+/// A decision and its time measurement take 0.1 us, or several us if reading the clock is a system
+/// call. Therefore several short calls share a decision.
 constexpr double kDecisionEveryUs = 200;
 constexpr double kMaxFollowing = 4095;
 /// A change of the size by this factor discards the measurements.

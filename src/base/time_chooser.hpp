@@ -1,4 +1,4 @@
-/// Selects the fastest of a few ways to do a recurring task, from predicted and measured times.
+/// Selection of the fastest alternative for a recurring task, from predicted and measured times.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,13 +12,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Uses no clock and executes nothing: the caller supplies predicted and measured times. For each
-/// alternative it keeps the ratio of measured to predicted times and multiplies later predictions
-/// by it. An alternative that is only predicted to be faster is tried before it replaces one that
-/// has been measured. Alternatives that are predicted or measured to take less than twice the best
-/// time are tried again from time to time, for at most a few percent of the total time.
+/// alternative it multiplies predictions by the recent ratio of measured to predicted times. An
+/// alternative that is only predicted to be faster is tried before it replaces a measured one.
+/// Alternatives whose predicted or measured time is less than twice the best time are tried again
+/// periodically, for at most a few percent of the total time.
 ///
-/// If nothing is known about an alternative, its prediction should be proportional to the work and
-/// shorter than any possible time: then it is tried early and never ruled out.
+/// For an alternative without a known cost, the prediction should be proportional to the work and
+/// shorter than any possible time: it is then tried early and never ruled out.
 ///
 /// Does not allocate memory. Not thread-safe.
 class JFPX_API TimeChooser {
@@ -51,10 +51,10 @@ class JFPX_API TimeChooser {
   ///   measurements
   /// @param predicted_us [us] by alternative
   Decision choose(double size, std::span<const double> predicted_us);
-  /// Records the time of the call for which choose() was last called. May be omitted if that call
+  /// Records the time of the call for which choose() was last called. May be omitted if the call
   /// was not executed or not timed.
   /// @param us [us] measured
-  /// @param predicted_us [us] prediction for the alternative and the work actually done
+  /// @param predicted_us [us] prediction for the alternative and the work that was done
   void record(double us, double predicted_us);
 
   /// Reason for the last decision.
@@ -76,12 +76,12 @@ class JFPX_API TimeChooser {
   struct Candidate {
     State state = State::removed;
     bool batched = false;
-    int cold_calls = 0;                     ///< calls left whose times are ignored
+    int cold_calls = 0;                     ///< remaining calls whose times are ignored
     double predicted_us = 0;                ///< for the next call
     std::array<double, kSamples> ratios{};  ///< the last ratios of measured to predicted times
     std::size_t samples = 0;                ///< measurements since the size changed
-    double correction = 1;  ///< lower quartile of the ratios: timing errors only add
-    double warm_size = -1;  ///< largest size for which its buffers have grown
+    double correction = 1;  ///< lower quartile of the ratios: disturbances only prolong times
+    double warm_size = -1;  ///< largest size for which the buffers have grown
     double waited_us = 0;   ///< total time of all calls since its last trial
     double patience = 1;    ///< factor of the time to the next trial; unsuccessful trials double it
 

@@ -10,8 +10,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// The size of the chunks of a loop over `count` elements. Fewer than `shared` elements are one
-/// chunk, because waking threads takes longer than they do.
+/// The chunk size of a loop over `count` elements. Fewer than `shared` elements are one chunk,
+/// because waking threads would take longer than the loop.
 inline std::size_t chunk_size(std::size_t count, std::size_t chunk, std::size_t shared) {
   return count < shared ? shared : chunk;
 }

@@ -1,4 +1,4 @@
-/// Classification of exceptions inside Bullet's callbacks, through which none may propagate.
+/// Classification of exceptions in Bullet's callbacks, through which none may propagate.
 #pragma once
 
 #include <jfpx/error.hpp>

@@ -47,7 +47,7 @@ inline void prefetch_geometry(const btCollisionObject& body) {
   prefetch(&(body.*BodyFields::check_collide_with));
 }
 
-/// Prefetches the same fields and the vtable pointer.
+/// Prefetches the fields of prefetch_geometry() and the vtable pointer.
 inline void prefetch_state(const btCollisionObject& body) {
   prefetch(&body);
   prefetch_geometry(body);
@@ -59,14 +59,14 @@ inline void prefetch_for_contact(const btCollisionObject& body) {
   prefetch(&(body.*BodyFields::spinning_friction));
 }
 
-/// Prefetches the number of points of a manifold. The member is private; two thresholds lie between
-/// it and the next public member.
+/// Prefetches the number of points of a manifold. The member is private; two thresholds separate it
+/// from the next public member.
 inline void prefetch_count(const btPersistentManifold* manifold) {
   prefetch(reinterpret_cast<const char*>(&manifold->m_companionIdA) - 2 * sizeof(btScalar) -
            sizeof(int));
 }
 
-/// Prefetches the bodies, the number of points and the thresholds, the last fields of a manifold.
+/// Prefetches the bodies, the number of points and the thresholds, which are the last fields.
 inline void prefetch_header(const btPersistentManifold* manifold) {
   prefetch_at(manifold, sizeof(btPersistentManifold) - 48);
   prefetch_at(manifold, sizeof(btPersistentManifold) - 1);
@@ -82,7 +82,7 @@ inline void prefetch_first_point(const btPersistentManifold* manifold) {
 inline constexpr int kManifoldsAhead = 16, kObjectsAhead = 8;
 
 /// Prefetches the flags, island tag, companion id and activation state of an object. The members
-/// are private, so the offset is a guess, which costs nothing if it is wrong.
+/// are private, so the offset is a guess; a wrong guess is harmless.
 inline void prefetch_island_state(const btCollisionObject* object) {
   constexpr std::size_t kGuess = sizeof(btScalar) == 4 ? 224 : 400;
   prefetch_at(object, kGuess);

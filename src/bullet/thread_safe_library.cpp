@@ -1,4 +1,4 @@
-/// Detects the flag by its effect on a constructor of the library.
+/// Detection of the flag by its effect on a constructor of the library.
 #include "src/bullet/thread_safe_library.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
@@ -8,8 +8,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-// btCreateDefaultTaskScheduler() would also tell, but starts threads, and its destruction resets
-// the thread indices that a scheduler of the program uses.
+// btCreateDefaultTaskScheduler() would also show the flag, but it starts threads, and its
+// destruction resets the thread indices of a scheduler of the program.
 bool is_thread_safe_library() {
   // One stack for ray tests per thread that Bullet supports.
   static const bool result = btDbvtBroadphase().m_rayTestStacks.size() > 1;

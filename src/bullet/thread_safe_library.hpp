@@ -13,10 +13,10 @@ namespace bullet {
 /// The first call tests the library; later calls return the same result. Thread-safe.
 bool is_thread_safe_library();
 
-/// Whether a solver with BT_THREADSAFE may treat the object differently. It decides by the
-/// collision flags instead of the mass whether a body moves. It also keeps the solver bodies of
-/// kinematic bodies in a table instead of in their companion ids: they may exist twice, which makes
-/// no difference unless impulses change them.
+/// Whether a solver with BT_THREADSAFE may treat the object differently. Such a solver tests the
+/// collision flags instead of the mass to decide whether a body moves. It also stores the solver
+/// bodies of kinematic bodies in a table instead of in their companion ids. They may then exist
+/// twice, which has no effect unless impulses change them.
 bool depends_on_thread_safety(const btCollisionObject& object);
 
 }  // namespace bullet

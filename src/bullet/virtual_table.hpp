@@ -10,8 +10,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// The function that a call of the virtual member function executes for this object. By the ABI, a
-/// pointer to a virtual member function is one more than the offset of the function in the table.
+/// The function that a call of the virtual member function executes for this object. In this ABI, a
+/// pointer to a virtual member function is the offset of the function in the table plus one.
 template <class Member>
 const void* virtual_function(const void* object, Member member) {
   std::ptrdiff_t offset;

@@ -14,7 +14,7 @@ void BlockTree::build(std::span<const Aabb> bounds, std::span<const std::uint32_
   sort(bounds);
   item_count_ = static_cast<std::uint32_t>(items.size());
   const std::size_t leaves = (items.size() + kWidth - 1) / kWidth;
-  // An inner block replaces up to eight blocks without a parent by one.
+  // Each inner block combines up to eight parentless blocks.
   const std::size_t inner = leaves > 1 ? (leaves + kWidth - 3) / (kWidth - 1) : 0;
   leaf_blocks_ = static_cast<std::uint32_t>(leaves);
   blocks_.resize(leaves + inner);
@@ -30,7 +30,7 @@ void BlockTree::build(std::span<const Aabb> bounds, std::span<const std::uint32_
 }
 
 void BlockTree::sort(std::span<const Aabb> bounds) {
-  constexpr std::size_t kSample = 64;  // boxes from which the order is derived
+  constexpr std::size_t kSample = 64;  // number of boxes that determine the order
   keys_.resize(bounds.size());
   spare_keys_.resize(bounds.size());
   if (bounds.empty()) return;

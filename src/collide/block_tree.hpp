@@ -13,13 +13,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Bounds of eight items or blocks. Unused lanes are empty: their lower bounds exceed the upper
-/// ones by more than any margin.
+/// bounds by more than any margin.
 struct alignas(64) TreeBlock {
   static constexpr std::uint32_t kWidth = 8;
   Real lower[3][kWidth], upper[3][kWidth];  ///< [m], by axis
 
   /// [m], far outside of the world, where all coordinates of bodies are below 1e10. Differences,
-  /// and their products with the reciprocal direction of a ray, are finite.
+  /// and their products with the reciprocal direction of a ray, remain finite.
   static constexpr Real kFar = Real(1e12);
   static constexpr Aabb kEmpty{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
 
@@ -48,11 +48,11 @@ struct alignas(64) TreeBlock {
 /// The arrays of a BlockTree, in host memory or on a device.
 struct BlockTreeView {
   static constexpr std::uint32_t kWidth = TreeBlock::kWidth;
-  /// 2^32 items make at most 12 levels; each block on the way leaves seven others on the stack.
+  /// 2^32 items have at most 12 levels; each visited block leaves seven siblings on the stack.
   static constexpr std::uint32_t kMostWaiting = 12 * kWidth;
 
-  /// The leaf blocks, then their parents and so on; the last one is the root. Inner block i has the
-  /// children 8 i to 8 i + 7.
+  /// The leaf blocks, followed by their parents, level by level up to the root, which is last.
+  /// Inner block i has the children 8 i to 8 i + 7.
   TreeBlock* blocks = nullptr;
   const std::uint32_t* items = nullptr;  ///< by leaf block and lane
   std::uint32_t leaf_blocks = 0, block_count = 0;
@@ -89,21 +89,21 @@ struct BlockTreeView {
     }
   }
 
-  /// Makes the bounds of a leaf block anew. @param bounds_of function from an item to its bounds
+  /// Recomputes the bounds of a leaf block. @param bounds_of function from an item to its bounds
   template <class BoundsOf>
   JFPX_HD void refit_leaf(std::uint32_t leaf, const BoundsOf& bounds_of) const {
     for (std::uint32_t lane = 0; lane < kWidth && leaf * kWidth + lane < item_count; ++lane) {
       blocks[leaf].set(lane, bounds_of(items[leaf * kWidth + lane]));
     }
   }
-  /// Makes the bounds of an inner block anew, whose children have theirs.
+  /// Recomputes the bounds of an inner block from the bounds of its children.
   JFPX_HD void refit_inner(std::uint32_t block) const {
     const std::uint32_t first = (block - leaf_blocks) * kWidth;
     for (std::uint32_t lane = 0; lane < kWidth && first + lane < block; ++lane) {
       blocks[block].set(lane, blocks[first + lane].bounds());
     }
   }
-  /// End of the inner blocks from `begin` on that depend only on blocks before `begin`.
+  /// End of the inner blocks from `begin` on whose children precede `begin`.
   JFPX_HD std::uint32_t end_of_level(std::uint32_t begin) const {
     const std::uint32_t end = leaf_blocks + begin / kWidth;
     return end > begin ? end : begin + 1;
@@ -117,7 +117,7 @@ class BlockTree {
   /// Replaces the contents, in O(n) time. Memory is kept for the next call.
   /// @param bounds,items of the same size
   void build(std::span<const Aabb> bounds, std::span<const std::uint32_t> items);
-  /// Makes the bounds of all items anew, and keeps their order.
+  /// Recomputes all bounds and keeps the order of the items.
   template <class BoundsOf>
   void refit(const BoundsOf& bounds_of) {
     const BlockTreeView tree = view();

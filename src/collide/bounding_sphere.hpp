@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// [m], bound of the absolute error of a distance below it, whose squares are denormal. The
+/// [m], upper bound of the absolute error of a shorter distance, whose squares are denormal. The
 /// relative error of longer distances is at most 3 epsilon.
 inline constexpr Real kLostLength = sizeof(Real) == 4 ? Real(0x1p-62) : Real(0x1p-510);
 
@@ -19,12 +19,12 @@ JFPX_HD constexpr Real safe_radius(Real radius) {
   return radius * (1 + 16 * kEpsilon) + kLostLength;
 }
 
-/// True only if b is inside a; conservative: may be false for a b that barely fits.
+/// True only if b is inside a. Conservative: may be false if b fits exactly.
 JFPX_HD inline bool encloses(const SphereInstance& a, const SphereInstance& b) {
   return safe_radius(length(b.centre - a.centre) + b.radius) <= a.radius;
 }
 
-/// The smallest sphere that encloses both, up to rounding. If one encloses the other, that one is
+/// The smallest sphere that encloses both, up to rounding. If one sphere encloses the other, it is
 /// returned unchanged.
 JFPX_HD inline SphereInstance enclosing(const SphereInstance& a, const SphereInstance& b) {
   if (encloses(a, b)) return a;
@@ -34,13 +34,13 @@ JFPX_HD inline SphereInstance enclosing(const SphereInstance& a, const SphereIns
   const Real radius = (distance + a.radius + b.radius) * Real(0.5);
   Vec3 centre = a.centre;
   if (distance > 0) centre = add_scaled(centre, across, (radius - a.radius) / distance);
-  // Measured from the rounded centre.
+  // Distances from the rounded centre.
   const Real to_a = length(a.centre - centre) + a.radius;
   const Real to_b = length(b.centre - centre) + b.radius;
   return {centre, safe_radius(to_a > to_b ? to_a : to_b)};
 }
 
-/// Increase of the squared radius of a when it is enlarged to enclose b (erratum E32).
+/// Increase of the squared radius of a by enlarging it to enclose b (erratum E32).
 JFPX_HD inline Real growth(const SphereInstance& a, const SphereInstance& b) {
   const Real radius = enclosing(a, b).radius;
   return radius * radius - a.radius * a.radius;

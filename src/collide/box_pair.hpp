@@ -9,8 +9,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Two boxes in the axes of box a: the axes of b are the columns of `rotation`, its centre is
-/// `offset`.
+/// Two boxes in the axes of box a. The columns of `rotation` are the axes of b; `offset` is its
+/// centre.
 struct BoxPair {
   Vec3 half_a, half_b;
   Mat3 rotation;
@@ -30,7 +30,7 @@ struct LeastOverlap {
 JFPX_HD constexpr Vec3 unit_axis(int i) {
   return {i == 0 ? Real(1) : Real(0), i == 1 ? Real(1) : Real(0), i == 2 ? Real(1) : Real(0)};
 }
-/// Half the length of a box's projection onto an axis that is given in the box's axes.
+/// Half the length of a box's projection onto an axis in the box's coordinates.
 JFPX_HD inline Real projected_half_length(const Vec3& half, const Vec3& axis) {
   return dot(half, {absolute(axis.x), absolute(axis.y), absolute(axis.z)});
 }
@@ -50,9 +50,9 @@ JFPX_HD inline bool try_axis(const BoxPair& pair, int index, const Vec3& axis, R
   return true;
 }
 
-/// `later` if its overlap is smaller, or its separation larger, by more than its rounding error and
-/// two per cent, else `first`. A box that lies flat thus keeps the same face, and its points, from
-/// step to step.
+/// Returns `later` if its overlap is smaller, or its separation larger, by more than its rounding
+/// error and two per cent; otherwise `first`. A resting box thus keeps its face and contact points
+/// from step to step.
 JFPX_HD inline const LeastOverlap& preferred(const LeastOverlap& first, const LeastOverlap& later) {
   const Real tolerance = later.error + absolute(first.distance) * Real(0.02);
   return later.axis >= 0 && later.distance > first.distance + tolerance ? later : first;
@@ -71,7 +71,7 @@ JFPX_HD inline bool least_overlap(const BoxPair& pair, Real margin, LeastOverlap
     for (int j = 0; j < 3; ++j) {
       const Vec3 axis = cross(unit_axis(i), pair.rotation.column(j));
       // Nearly parallel edges have no well-defined common normal: its error, epsilon / sine, would
-      // exceed the gap that the face axes miss, which is of the order of the sine (erratum E15).
+      // exceed the gap missed by the face axes, which is proportional to the sine (erratum E15).
       const Real sine = length(axis);
       if (!(sine * sine > 4 * kEpsilon)) continue;
       const Vec3 unit = axis * (Real(1) / sine);
@@ -82,8 +82,8 @@ JFPX_HD inline bool least_overlap(const BoxPair& pair, Real margin, LeastOverlap
   return true;
 }
 
-/// A convex polygon in the axes of a reference box. Edges are numbered: 0 to 3 are those of the
-/// incident face, 4 to 7 lie in the planes that clip it.
+/// A convex polygon in the axes of a reference box. Edges 0 to 3 are those of the incident face;
+/// edges 4 to 7 lie in the clipping planes.
 struct Polygon {
   Vec3 corner[8];
   int edge[8] = {};  ///< from each corner to the next one
@@ -115,8 +115,8 @@ JFPX_HD inline Polygon clipped(const Polygon& polygon, int axis, Real side, Real
 }
 
 /// The incident face: the face of a box whose outward normal is most antiparallel to `normal`, in
-/// the axes in which the pose (`rotation`, `offset`) is given.
-/// @param face receives its number, 0 to 5
+/// the axes of the pose (`rotation`, `offset`).
+/// @param face receives the number of the face, 0 to 5
 JFPX_HD inline Polygon facing_quad(const Vec3& half, const Mat3& rotation, const Vec3& offset,
                                    const Vec3& normal, int* face) {
   const Vec3 local = transform_transpose(rotation, normal);
@@ -177,9 +177,8 @@ JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec
 }
 
 /// The midpoint between the closest points of two lines (Goldman 1990), clamped to the edges: edge
-/// i of a and edge j of b, of each direction the edge nearest to the other box. If the boxes
-/// overlap and only one edge ends before the other, the midpoint at that end. The edges must not be
-/// parallel.
+/// i of a and edge j of b, in each direction the edge nearest to the other box. If the boxes
+/// overlap and only one edge is too short, the midpoint at its end. The edges must not be parallel.
 JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const LeastOverlap& least) {
   const Mat3 identity;
   const Vec3 dir_a = unit_axis(i), dir_b = pair.rotation.column(j);
@@ -188,15 +187,15 @@ JFPX_HD inline Vec3 edge_point(const BoxPair& pair, int i, int j, const LeastOve
   Vec3 on_b = support(pair.half_b, pair.rotation, pair.offset, least.normal);
   on_b -= dir_b * dot(dir_b, on_b - pair.offset);
   const Vec3 across = on_b - on_a, common = cross(dir_a, dir_b);
-  // Determinants lose half as many digits as the cosine does for edges at a small angle.
+  // For edges at a small angle, determinants lose half as many digits as the cosine.
   const Real scale = Real(1) / length_squared(common);
   const auto clamp = [](Real x, Real limit) { return x > limit ? limit : x < -limit ? -limit : x; };
   const Real s = dot(cross(across, dir_b), common) * scale;
   const Real t = dot(cross(across, dir_a), common) * scale;
   const Real s_on_edge = clamp(s, pair.half_a[i]), t_on_edge = clamp(t, pair.half_b[j]);
   const Vec3 p = add_scaled(on_a, dir_a, s_on_edge), q = add_scaled(on_b, dir_b, t_on_edge);
-  // Edges of least overlap cross each other. If rounding has selected others, the end of the one
-  // that does not reach the other is in the overlap.
+  // Edges of least overlap cross each other. If rounding has selected other edges, the end of the
+  // edge that is too short is in the overlap.
   const bool overlaps = least.distance <= 0;
   const bool a_ends = overlaps && s != s_on_edge, b_ends = overlaps && t != t_on_edge;
   if (a_ends && !b_ends) return add_scaled(p, least.normal, least.distance * Real(-0.5));
@@ -214,7 +213,7 @@ JFPX_HD inline BoxPair make_box_pair(const Box& a, const Transform& pose_a, cons
 
 /// The contact manifold of two boxes for an axis of least overlap. The normal points from b to a.
 /// Feature numbers of a reference face of b, and of edges, are above those of a.
-/// @param margin points with at most this distance are in the manifold
+/// @param margin largest distance of a point of the manifold
 JFPX_HD inline Manifold box_manifold(const BoxPair& pair, const LeastOverlap& least,
                                      const Transform& pose_a, const Transform& pose_b,
                                      Real margin) {
@@ -249,8 +248,8 @@ JFPX_HD inline Manifold box_manifold(const BoxPair& pair, const LeastOverlap& le
   return manifold;
 }
 
-/// The contact manifold of two boxes; boxes that only touch are in contact. The normal points from
-/// b to a.
+/// The contact manifold of two boxes, also for boxes in exact contact. The normal points from b to
+/// a.
 JFPX_HD inline Manifold collide_boxes(const Box& a, const Transform& pose_a, const Box& b,
                                       const Transform& pose_b) {
   const BoxPair pair = make_box_pair(a, pose_a, b, pose_b);

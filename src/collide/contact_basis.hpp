@@ -12,8 +12,8 @@ struct ContactBasis {
   Vec3 normal, tangent, bitangent;
 };
 
-/// Requires a unit vector. The tangent is perpendicular to the axis of the smaller of |n.x| and
-/// |n.y|, so that its length before normalization is at least 0.7 (erratum E4).
+/// Requires a unit vector. The tangent is perpendicular to the x or y axis, whichever has the
+/// smaller |n.x| or |n.y|, so its length before normalization is at least 0.7 (erratum E4).
 JFPX_HD inline ContactBasis contact_basis(const Vec3& normal) {
   Vec3 tangent;
   if (absolute(normal.x) > absolute(normal.y)) {

@@ -1,4 +1,4 @@
-/// The contact of two shapes that touch, that are closer than a margin, or that meet during a step.
+/// Contact of two shapes that touch, are closer than a margin, or will touch during a step.
 #pragma once
 
 #include <jfpx/shape.hpp>
@@ -20,8 +20,8 @@ struct Posed {
 struct PairMotion {
   Vec3 motion;      ///< [m], of a relative to b during the step
   Real margin = 0;  ///< [m], >= 0
-  /// [m]: a box and a sphere, or another box, that are farther apart have no contact, whatever
-  /// their motion.
+  /// [m], distance beyond which a box has no contact with a sphere or another box, whatever their
+  /// motion.
   Real limit = kMaxReal;
   Vec3 origin_a, origin_b;  ///< [m], centres of mass of the bodies
 
@@ -29,15 +29,15 @@ struct PairMotion {
   JFPX_HD PairMotion flipped() const { return {-motion, margin, limit, origin_b, origin_a}; }
 };
 
-/// A point of a manifold, as a solver needs it.
+/// A point of a manifold, as input of a solver.
 struct SolverPoint {
   Vec3 arm_a, arm_b;          ///< [m], world axes, from the centres of mass
   Real distance = 0;          ///< [m]; > 0: a gap
   std::uint32_t feature = 0;  ///< identifies the point within its manifold
 };
 
-/// Contact of two shapes with one normal: the points for a solver at the start of the step, and the
-/// points where the shapes touch.
+/// Contact of two shapes with one normal: solver points at the start of the step, and points where
+/// the shapes touch.
 struct PairManifold {
   static constexpr std::uint32_t kMaxPoints = 8;
   /// A point in the middle of the overlap.
@@ -51,7 +51,7 @@ struct PairManifold {
   Touch touches[kMaxPoints];
 
   JFPX_HD void clear() { point_count = touch_count = 0; }
-  /// Adds a point, and its touch if the shapes touch there. @param touch middle of the overlap
+  /// Adds a solver point, and a touch if the distance is <= 0. @param touch middle of the overlap
   JFPX_HD void add(const Vec3& arm_a, const Vec3& arm_b, Real distance, std::uint32_t feature,
                    const Vec3& touch) {
     points[point_count++] = {arm_a, arm_b, distance, feature};
@@ -62,7 +62,7 @@ struct PairManifold {
   }
   /// Exchanges the shapes.
   JFPX_HD void flip() {
-    if (point_count == 0 && touch_count == 0) return;  // then the normal is not set
+    if (point_count == 0 && touch_count == 0) return;  // the normal is not set
     normal = -normal;
     for (std::uint32_t i = 0; i < point_count; ++i) {
       const Vec3 arm_a = points[i].arm_a;
@@ -76,15 +76,15 @@ struct PairManifold {
 struct Separation {
   Vec3 normal;           ///< unit
   Real distance = 0;     ///< [m]; < 0: depth of penetration
-  bool is_valid = true;  ///< false: numbers are beyond the range of Real
+  bool is_valid = true;  ///< false: values exceed the range of Real
 };
 
 /// Largest number of steps of a conservative advancement.
 inline constexpr int kMaxAdvances = 16;
 
-/// Conservative advancement (Mirtich 1996): the part t of the motion, in [0, 1], after which the
-/// shapes are not farther apart than the margin.
-/// @param separation_at function from t to the Separation after that part of the motion
+/// Conservative advancement (Mirtich 1996): the fraction t of the motion, in [0, 1], after which
+/// the distance of the shapes is at most the margin.
+/// @param separation_at function from t to the Separation after that fraction of the motion
 /// @returns whether the shapes have a contact
 template <class SeparationAt>
 JFPX_HD bool advance(const PairMotion& pair, const SeparationAt& separation_at, Real* t) {
@@ -99,7 +99,7 @@ JFPX_HD bool advance(const PairMotion& pair, const SeparationAt& separation_at, 
     if (!(*t <= 1)) return false;
   }
 }
-/// A point that has moved for a part of the motion; the point itself for t = 0.
+/// A point after a fraction t of the motion; unchanged for t = 0.
 JFPX_HD inline Vec3 moved(const Vec3& point, const PairMotion& pair, Real t) {
   return t > 0 ? add_scaled(point, pair.motion, t) : point;
 }

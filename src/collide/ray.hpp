@@ -11,7 +11,7 @@ namespace detail {
 struct RayEntry {
   bool hit = false;
   Real distance = 0;  ///< [m], >= 0
-  Vec3 normal;        ///< unit, outwards; opposite to the ray if it starts inside
+  Vec3 normal;        ///< unit, outwards; opposite to a ray that starts inside
 };
 
 }  // namespace detail

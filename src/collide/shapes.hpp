@@ -15,7 +15,7 @@ namespace detail {
 template <>
 inline constexpr const char* kShapeName<Compound> = "compound";
 
-/// A solid as find_contact() takes it: a sphere is a SphereInstance.
+/// A solid in the form that find_contact() accepts: a sphere is a SphereInstance.
 template <class S>
 JFPX_HD inline Posed<S> instance(const S& solid, const Transform& pose) {
   return {solid, pose};
@@ -24,8 +24,8 @@ JFPX_HD inline SphereInstance instance(const Sphere& sphere, const Transform& po
   return {pose.origin, sphere.radius};
 }
 
-/// The contact of two solids. A pair has one test, for one order of its kinds, in the header of a
-/// solid; without one, this function does not compile.
+/// The contact of two solids. Each pair of kinds has one test, for one order of the kinds, in the
+/// header of a solid. A missing test is a compile error.
 /// @param manifold empty; receives the contact
 template <class A, class B>
 JFPX_HD void find_contact_of_any(const A& a, const B& b, const PairMotion& pair,

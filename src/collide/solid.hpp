@@ -11,12 +11,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Name of a shape in the field "type" of the JSON of scenes. Each shape's header has its own.
+/// Name of a shape in the field "type" of the JSON of scenes. Specialized in each shape's header.
 template <class S>
 inline constexpr const char* kShapeName = nullptr;
 
-/// Dimensions of a solid: a core, which is a point, a segment along the y axis or a box, and a
-/// radius around it.
+/// Dimensions of a solid. The core is a point, a segment along the y axis or a box; the solid
+/// consists of all points within `radius` of the core.
 struct Solid {
   Vec3 half_extents;  ///< [m], of the core
   Real radius = 0;    ///< [m]
@@ -50,7 +50,7 @@ inline constexpr std::uint32_t kSolidKind = SolidKinds::template index_of<S>();
 static_assert(kSolidKind<Sphere> == 0);
 
 /// Calls visit(shape, part, number) for the shape of a body, or for each part of a compound in
-/// order. `part` is null, and `number` 0, for a body that is no compound.
+/// order. For a body that is not a compound, `part` is null and `number` is 0.
 template <class Visit>
 void for_each_part(const Shape& shape, const Visit& visit) {
   const auto visit_parts = [&](const auto& whole) {
@@ -66,7 +66,7 @@ void for_each_part(const Shape& shape, const Visit& visit) {
   std::visit(visit_parts, shape);
 }
 
-/// Whether S is one of the solids, and not a half-space or a plane.
+/// Whether S is a solid, as opposed to a half-space or a plane.
 template <class S>
 inline constexpr bool kIsSolid = kSolidKind<S> < SolidKinds::kCount;
 

@@ -7,8 +7,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// The contact of two spheres whose centres differ by d = a - b, of length len, and whose radii add
-/// up to sum. Coincident centres give the normal (1,0,0) (erratum E7).
+/// The contact of two spheres with the difference of centres d = a - b, its length len, and the sum
+/// of radii. Coincident centres have the normal (1,0,0) (erratum E7).
 JFPX_HD inline PairResult sphere_pair_contact(const Vec3& d, Real len, Real sum) {
   PairResult r;
   r.touching = 1;
@@ -23,7 +23,7 @@ JFPX_HD inline PairResult sphere_pair_contact(const Vec3& d, Real len, Real sum)
 
 /// Tests two spheres with the order of operations of Bullet's btSphereSphereCollisionAlgorithm:
 /// each operation is one IEEE rounding, the normal is scaled by a reciprocal, and a NaN fails the
-/// rejection test and therefore gives a contact.
+/// rejection test and therefore yields a contact.
 JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b) {
   const Vec3 d = a.centre - b.centre;
   const Real len = square_root((d.x * d.x + d.y * d.y) + d.z * d.z);
@@ -32,8 +32,8 @@ JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const Sphere
   return sphere_pair_contact(d, len, sum);
 }
 
-/// The same without a branch, for lists that mix touching and separated pairs, where a branch would
-/// be unpredictable. Always writes *contact. Returns true if the spheres touch.
+/// Branch-free version for lists that mix touching and separated pairs, where a branch would be
+/// unpredictable. Always writes *contact. Returns true if the spheres touch.
 JFPX_HD inline bool find_sphere_contact(const SphereInstance& a, const SphereInstance& b,
                                         PairContact* contact) {
   const Vec3 d = a.centre - b.centre;
@@ -45,7 +45,7 @@ JFPX_HD inline bool find_sphere_contact(const SphereInstance& a, const SphereIns
   return !(len > sum);
 }
 
-/// The same test with a margin: spheres up to `threshold` apart are in contact.
+/// Version with a margin: spheres up to `threshold` apart are in contact.
 JFPX_HD inline PairResult test_sphere_pair(const SphereInstance& a, const SphereInstance& b,
                                            Real threshold) {
   const Vec3 d = a.centre - b.centre;

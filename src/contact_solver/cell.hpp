@@ -1,4 +1,4 @@
-/// Cells of memory by which the threads of a device hand over the velocities of bodies.
+/// Memory cells through which the threads of a device exchange the velocities of bodies.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,8 +10,8 @@ inline namespace JFPX_ABI {
 
 inline constexpr int kCellNumbers = sizeof(Real) == 4 ? 3 : 1;
 
-/// Numbers, and the sequence number of the change that has produced them: a thread that finds the
-/// sequence number that it waits for has also received the numbers, without a fence.
+/// Numbers and the sequence number of the update that wrote them. A thread that reads the expected
+/// sequence number has received the numbers in the same load, without a fence.
 struct alignas(16) Cell {
   Real numbers[kCellNumbers];
   std::uint32_t sequence;
@@ -24,7 +24,7 @@ struct alignas(16) MemoryCell {
 };
 
 /// Loads 16 bytes atomically. On a device, from the L2 cache, which all multiprocessors share;
-/// registers of 128 bits take PTX ISA 8.3, of CUDA 12.3.
+/// 128-bit registers require PTX ISA 8.3 (CUDA 12.3).
 JFPX_HD inline MemoryCell load_memory_cell(const MemoryCell* at) {
 #if defined(__CUDA_ARCH__)
   unsigned long long low, high;
@@ -38,7 +38,7 @@ JFPX_HD inline MemoryCell load_memory_cell(const MemoryCell* at) {
 #endif
 }
 
-/// Stores 16 bytes atomically, as load_memory_cell().
+/// Stores 16 bytes atomically; see load_memory_cell().
 JFPX_HD inline void store_memory_cell(MemoryCell* at, const MemoryCell& cell) {
 #if defined(__CUDA_ARCH__)
   const auto pair = [&](int i) {

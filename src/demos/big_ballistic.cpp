@@ -53,7 +53,7 @@ class BigBallistic final : public GunDemo {
   std::vector<Round> rounds_;  ///< rounds in flight, oldest first
 };
 
-/// Bodies of the scene keep their indices, because only rounds are added and removed.
+/// The bodies of the scene have constant indices, because only rounds are added and removed.
 bool BigBallistic::is_crate(std::uint32_t body) const {
   const std::vector<BodyDef>& bodies = scene_.bodies;
   return body < bodies.size() && std::holds_alternative<Box>(bodies[body].shape);

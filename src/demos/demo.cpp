@@ -45,7 +45,7 @@ StepReport Demo::step(std::span<const Input> inputs) {
   }
   std::vector<bool> acted(controls_.size());
   for (const Input& input : inputs) {
-    // Keyboards with key repeat report a press of a control that is already down; it is ignored.
+    // Ignores repeated presses of a control that is already down (key repeat).
     if (input.pressed && !down_[input.control]) {
       act(input.control);
       acted[input.control] = true;

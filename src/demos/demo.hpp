@@ -21,7 +21,7 @@ struct Control {
   std::string_view name;     ///< the name in input scripts, for example "fire"
   std::string_view summary;  ///< one line for the user
   std::string_view key;      ///< key in the thesis: "w", "1", "mouse"
-  bool repeats = false;      ///< acts in every step while it is down; else once per press
+  bool repeats = false;      ///< acts in every step while it is down; otherwise once per press
 };
 
 /// A press or release of a control.
@@ -30,8 +30,8 @@ struct Input {
   bool pressed = true;
 };
 
-/// Interface of a demo. The states depend on the inputs of each step alone, and not on the clock:
-/// equal inputs give equal bits. Not thread-safe.
+/// Interface of a demo. The states depend only on the inputs of each step: equal inputs yield equal
+/// bits. Not thread-safe.
 class Demo {
  public:
   virtual ~Demo() = default;
@@ -44,18 +44,18 @@ class Demo {
   /// Advances the demo by one step with the inputs since the previous step. Inputs act in the given
   /// order (erratum E42); a control that is pressed and released within one step acts once.
   /// @throws InvalidArgument if an input has an invalid control; the demo is then unchanged (E42).
-  ///   Also throws as World::step().
+  ///   Also throws the exceptions of World::step().
   StepReport step(std::span<const Input> inputs = {});
 
   /// The moving objects, for hashes: bodies in the order of World::states(), or the rounds in
   /// flight.
   virtual std::vector<BodyState> states() const = 0;
   std::uint64_t state_hash() const { return jfpx::state_hash(states()); }
-  /// Replaces the content of *view by a picture of the current state.
+  /// Replaces the content of *view by the current state.
   virtual void draw(View* view) const = 0;
   /// The world of the demo's rigid bodies; null if the demo has none.
   virtual const World* world() const { return nullptr; }
-  /// The scene that this world starts from; null if the demo has none.
+  /// The initial scene of this world; null if the demo has none.
   virtual const Scene* scene() const { return nullptr; }
 
  protected:
@@ -92,8 +92,8 @@ struct Entry {
 std::span<const Entry> all();
 
 /// Creates the demo called `name`. The name of a scene is also valid.
-/// @throws InvalidArgument for an unknown name or an invalid dt. Also throws as World and
-///   scenes::make().
+/// @throws InvalidArgument for an unknown name or an invalid dt; the exceptions of World and
+///   scenes::make()
 std::unique_ptr<Demo> make(std::string_view name, const Options& options = {});
 /// A demo of any scene. Its only control, "reset", restarts the scene.
 std::unique_ptr<Demo> make(const Scene& scene, const WorldSettings& settings = {});

@@ -61,8 +61,8 @@ AeroControl wing(BodyId body, Real z) {
           .point = {-1, 0, z}};
 }
 
-/// The numbers of the thesis, but with the inertia that belongs to the mass (errata E22, E23) and
-/// with damping once per step (E18). The ground is no body: see keep_above_ground().
+/// The numbers of the thesis, but with the inertia that corresponds to the mass (errata E22, E23)
+/// and with damping once per step (E18). The ground is not a body: see keep_above_ground().
 Scene flight_scene(Real dt) {
   BodyDef aircraft;
   aircraft.shape = Box{{2, 1, 1}};
@@ -85,7 +85,7 @@ struct Propulsion {
   }
 };
 
-/// A box of the drawing.
+/// A box of the picture.
 struct Part {
   Vec3 size, position;  ///< [m], body axes
   Colour colour;
@@ -195,7 +195,7 @@ StepReport Flight::advance() {
 }
 
 /// The ground is a lower limit of the height of the centre of mass, as in the original, but also
-/// stops its downward velocity (erratum E22). An aircraft that descends too fast restarts.
+/// stops its downward velocity (erratum E22). An aircraft that descends too fast is reset.
 void Flight::keep_above_ground() {
   BodyState state = world_.state(aircraft());
   if (state.position.y >= 0) return;

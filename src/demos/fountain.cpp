@@ -1,4 +1,4 @@
-/// Demo fountain: a jet of balls, of which many are added and removed in every step.
+/// Demo fountain: a jet of balls, many of which are added and removed in every step.
 #include <jfpx/error.hpp>
 #include <jfpx/random.hpp>
 
@@ -28,8 +28,8 @@ constexpr Real kSpacing = Real(0.11);  // [m], between the sites of the nozzle
 constexpr Real kSpeed = 9;             // [m/s], upward; a ball moves 0.15 m in 1/60 s
 constexpr Real kRim = Real(0.6);       // [m], height of the basin
 
-/// Number of sites along an edge of the nozzle. Each emits at most 60 balls per second, so that
-/// successive balls do not overlap.
+/// Number of sites along an edge of the nozzle. Each site emits at most 60 balls per second, so
+/// that successive balls do not overlap.
 Real nozzle_side(std::uint32_t balls) {
   return std::max(Real(1), std::ceil(std::sqrt(static_cast<Real>(balls) / Real(60 * kLifetime))));
 }
@@ -116,7 +116,7 @@ void Fountain::emit(Real delay) {
   alive_.push_back({world_.add(ball), world_.steps()});
 }
 
-/// The numbers of balls follow from the numbers of steps alone.
+/// The numbers of balls depend only on the numbers of steps.
 StepReport Fountain::advance() {
   const auto lifetime = static_cast<std::uint64_t>(std::ceil(kLifetime / dt() - 0.5));
   while (!alive_.empty() && world_.steps() - alive_.front().step >= lifetime) {

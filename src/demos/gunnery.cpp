@@ -1,4 +1,4 @@
-/// Controls and drawing that both ballistic demos use.
+/// Controls and drawing of both ballistic demos.
 #include "src/demos/gunnery.hpp"
 
 namespace jfpx {

@@ -22,7 +22,7 @@ inline constexpr std::array<Control, 6> kGunControls{{{"pistol", "choose the pis
                                                       {"fire", "fire one round", "mouse"},
                                                       {"reset", "restart", "r"}}};
 
-inline constexpr std::size_t kMaxRounds = 160;  ///< in flight; then "fire" has no effect
+inline constexpr std::size_t kMaxRounds = 160;  ///< in flight; at this number, "fire" has no effect
 inline constexpr Real kMaxRange = 200;          ///< [m], along z
 inline constexpr double kMaxAge = 5;            ///< [s]; unlimited in the original (E44, E45)
 

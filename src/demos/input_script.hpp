@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace demos {
 
-/// One line of a script: a control is pressed or released before step `step`.
+/// One line of a script: a press or release of a control before step `step`.
 struct ScriptLine {
   std::uint64_t step = 1;  ///< first step: 1
   std::string control;     ///< name of the Control
@@ -36,7 +36,7 @@ struct InputScript {
 InputScript parse_input_script(std::string_view text);
 /// The inverse of parse_input_script().
 std::string to_text(const InputScript& script);
-/// @throws FileError; InvalidArgument as parse_input_script(), prefixed with the path.
+/// @throws FileError; InvalidArgument like parse_input_script(), prefixed with the path
 InputScript load_input_script(const std::string& path);
 /// Writes the file atomically. @throws FileError
 void save_input_script(const InputScript& script, const std::string& path);
@@ -44,13 +44,12 @@ void save_input_script(const InputScript& script, const std::string& path);
 /// Supplies the inputs of a script to a demo, step by step.
 class ScriptPlayer {
  public:
-  /// @throws InvalidArgument if the script is for a different demo, or names a control that the
-  ///   demo does not have.
+  /// @throws InvalidArgument if the script is for a different demo, or contains an unknown control
   ScriptPlayer(const InputScript& script, const Demo& demo);
 
   /// The inputs of the next step. The span is valid until the next call.
   std::span<const Input> next();
-  /// True when no input is left.
+  /// True after the last input.
   bool finished() const { return next_ == inputs_.size(); }
 
  private:

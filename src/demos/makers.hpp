@@ -1,4 +1,4 @@
-/// Factory functions of the demos, and the parts that their drawings share.
+/// Factory functions of the demos, and shared parts of their pictures.
 #pragma once
 
 #include "src/demos/demo.hpp"

@@ -8,13 +8,13 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Centre of mass and inertia of a compound. Not finite if a value overflows, or if the sum over
-/// the parts of volume times density underflows to 0.
+/// Centre of mass and inertia of a compound. Not finite if a value overflows, or if the sum of
+/// volume times density over the parts underflows to 0.
 struct MassProperties {
   Vec3 centre;   ///< [m], body axes
   Mat3 inertia;  ///< [kg m^2], body axes, about the origin (not about `centre`)
 };
-/// Parts are solid and may overlap; each has its volume times density as its share of the mass.
+/// Parts are solid and may overlap. The mass of a part is proportional to volume times density.
 /// @param mass [kg], total mass of the compound
 JFPX_API MassProperties mass_properties(const Compound& compound, Real mass);
 
@@ -24,7 +24,7 @@ inline Real outer_radius(const CompoundPart& part) {
   const auto radius = [](const auto& solid) { return detail::outer_radius(solid); };
   return length(part.position) + std::visit(radius, part.shape);
 }
-/// The same for all solids of a body; 0 for half-spaces and planes.
+/// Outer radius of all solids of a body; 0 for half-spaces and planes.
 inline Real outer_radius(const Shape& shape) {
   Real radius = 0;
   detail::for_each_part(shape, [&](const auto& s, const CompoundPart* part, std::uint32_t) {
@@ -35,7 +35,7 @@ inline Real outer_radius(const Shape& shape) {
   return radius;
 }
 
-/// Whether the shape is a half-space or a plane, which is infinite and follows no pose.
+/// Whether the shape is a half-space or a plane, which is infinite and ignores poses.
 inline bool is_wall(const Shape& shape) {
   return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
 }

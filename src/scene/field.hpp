@@ -1,9 +1,9 @@
 /// Description of the fields of public types: their names, ranges, and presence in JSON.
 ///
-/// A function each_field(object, visit) calls visit(field, member) for each field of a type, with a
-/// Field. It names all members of its type in a structured binding, so that a new member does not
-/// compile until it is listed. The reader and the writer of JSON, validation, snapshots and
-/// recordings visit these lists.
+/// A function each_field(object, visit) calls visit(field, member) with a Field for each field of a
+/// type. It lists all members of its type in a structured binding, so that a missing member is a
+/// compile error. The reader and the writer of JSON, validation, snapshots and recordings use these
+/// lists.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -15,18 +15,18 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Range of a field for which every value is valid, or whose members have ranges. The other ranges
-/// have a function contains(value), and as `text` the end of the sentence "it must be ...".
+/// Range of a field for which every value is valid, or whose members have ranges. Other ranges have
+/// a function contains(value), and `text`, the end of the sentence "it must be ...".
 struct AnyValue {};
 
-/// Range of a field that has further conditions, or others than its members.
+/// Range of a field with further conditions, or with different conditions than its members.
 struct CheckedByCode {};
 
 /// Numbers from `least` to `most`, and vectors of such numbers.
 struct Interval {
   Real least, most;
   const char* text;
-  bool is_open = false;  ///< whether `least` is not in the interval
+  bool is_open = false;  ///< whether `least` is excluded from the interval
 
   constexpr bool contains(Real x) const { return (is_open ? x > least : x >= least) && x <= most; }
   constexpr bool contains(std::uint32_t x) const { return contains(static_cast<Real>(x)); }
@@ -63,7 +63,7 @@ inline constexpr Interval kAboveZeroToOne{0, 1, "in (0, 1]", true};
 inline constexpr Interval kSize{0, kMaxCoordinate, "> 0 and at most 1e9", true};
 inline constexpr Interval kSizes{0, kMaxCoordinate, "> 0 and at most 1e9 each", true};
 inline constexpr Interval kInWorld{-kMaxCoordinate, kMaxCoordinate, "between -1e9 and 1e9"};
-/// A denormal length of a step, and all values computed from it, would lose digits.
+/// A denormal step length, and all values computed from it, would lose digits.
 inline constexpr Interval kStepLength{std::numeric_limits<Real>::min(), kMostReal,
                                       "finite, > 0 and not denormal"};
 inline constexpr UnitLength kUnitVector{"a unit vector, to a thousandth"};
@@ -71,9 +71,9 @@ inline constexpr UnitLength kUnitQuaternion{"a unit quaternion, to a thousandth"
 
 /// Presence of a field in JSON.
 enum class Presence : std::uint8_t {
-  required,  ///< a reader needs it
-  optional,  ///< always written; a reader takes the default for an absent field
-  newer,     ///< not written if it has its default, so that older versions read the file
+  required,  ///< must be present
+  optional,  ///< always written; an absent field has the default
+  newer,     ///< written only if not the default, so that older versions can read the file
 };
 
 template <Presence kPresenceOf, class RangeOf>

@@ -26,19 +26,19 @@ void require_in_range(std::string_view name, const Value& value, const Range& ra
   if (!range.contains(value)) throw InvalidArgument(fault(name, value, range.text));
 }
 
-/// Apart from the functions below, so that compilers inline these.
+/// Separate from the functions below, so that compilers inline the latter.
 template <class Value>
 bool put_fault(const char* field, const Value& value, const char* range, std::string* found) {
   *found = fault(field, value, range);
   return false;
 }
 
-/// Whether all fields are in their ranges. @param found gets name, value and range of the first one
-/// that is not
+/// Whether all fields are in their ranges. @param found receives name, value and range of the first
+/// field that is not
 template <HasFields T>
 bool are_in_range(const T& object, std::string* found);
 
-/// Whether a field is in its range, likewise.
+/// Whether a field is in its range. @param found receives name, value and range if it is not
 template <class Field, class T>
 bool is_in_range(const Field& field, const T& member, std::string* found) {
   using Range = typename Field::Range;
@@ -82,7 +82,7 @@ bool are_in_range(const T& object, std::string* found) {
   });
   return are;
 }
-/// The first field that is not in its range, with value and range; empty if there is none.
+/// Message about the first field that is not in its range, with value and range; empty if all are.
 template <HasFields T>
 std::string find_field_fault(const T& object) {
   std::string found;

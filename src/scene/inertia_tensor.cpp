@@ -1,5 +1,5 @@
-/// Validation and inversion of inertia tensors, in double and on tensors that are scaled to a trace
-/// of 1, so that no product overflows.
+/// Validation and inversion of inertia tensors, in double, scaled to a trace of 1, so that no
+/// product overflows.
 #include "src/scene/inertia_tensor.hpp"
 
 #include <jfpx/scene.hpp>
@@ -52,7 +52,7 @@ const char* inertia_must_be(const Mat3& tensor) {
   const Symmetric i = scaled(tensor, trace(tensor));
   if (!i.positive_definite()) return "positive definite";
   // The second moment of the mass, tr(I)/2 - I, is positive semidefinite, which is equivalent to
-  // the triangle inequality of the principal moments. Equality, a flat body, is accepted with the
+  // the triangle inequality of the principal moments. Equality (a flat body) is accepted with the
   // precision of four typed digits.
   const double half = 0.5 + static_cast<double>(kUnitTolerance);
   const Symmetric second_moment{half - i.xx, half - i.yy, half - i.zz, -i.xy, -i.yz, -i.zx};

@@ -6,12 +6,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Returns null for a valid tensor, else the first requirement that it violates, as the end of the
+/// Returns null for a valid tensor, otherwise the first violated requirement as the end of the
 /// sentence "it must be ...". A valid tensor is finite, symmetric and positive definite, has a
 /// finite inverse, and none of its principal moments exceeds the sum of the others.
 const char* inertia_must_be(const Mat3& tensor);
 
-/// Inverse of an inertia tensor. @param tensor one for which inertia_must_be() returns null
+/// Inverse of an inertia tensor. @param tensor must be valid according to inertia_must_be()
 Mat3 inverse_inertia(const Mat3& tensor);
 
 /// True if all off-diagonal entries are 0.

@@ -1,4 +1,4 @@
-/// Fields of bodies and scenes, in the order in which JSON and snapshots have them; see field.hpp.
+/// Fields of bodies and scenes, in the order of JSON and snapshots; see field.hpp.
 #pragma once
 
 #include <jfpx/scene.hpp>

@@ -1,5 +1,5 @@
-/// Strict reader of the JSON form of scenes and recording headers, whose errors name the faulty
-/// field.
+/// Strict reader of the JSON form of scenes and recording headers. Errors contain the name of the
+/// faulty field.
 #include "src/scene/scene_json.hpp"
 
 #include <jfpx/error.hpp>
@@ -37,7 +37,7 @@ const char* kind_of(const Json& value) {
   return value.is_null() ? "null" : "a number";
 }
 
-/// Text of a value for a message. Arrays and objects are named only by their kind, because writing
+/// Text of a value for a message. Arrays and objects are reported by kind only, because writing
 /// them recurses once per nesting level.
 std::string text_of(const Json& json) { return json.is_structured() ? kind_of(json) : json.dump(); }
 
@@ -66,7 +66,7 @@ void read(const Json& json, const std::string& where, std::uint64_t& out) {
   }
   out = json.get<std::uint64_t>();
 }
-/// An enumeration whose to_string() returns null past the last value.
+/// An enumeration whose to_string() returns null beyond the last value.
 template <class Enum>
 requires std::is_enum_v<Enum>
 void read(const Json& json, const std::string& where, Enum& out) {
@@ -112,7 +112,7 @@ void read(const Json& json, const std::string& where, std::vector<T>& list);
 void read(const Json& json, const std::string& where, BodyId& body);
 void read(const Json& json, const std::string& where, std::optional<BodyId>& body);
 
-/// Reads the fields of one object and rejects the fields that were not read.
+/// Reads the fields of one object and rejects unknown fields.
 class ObjectReader {
  public:
   ObjectReader(const Json& json, std::string where) : json_(json), where_(std::move(where)) {
@@ -177,7 +177,7 @@ bool is_name_of(const std::string& type) {
   return type == kTypeName<T> || (std::is_same_v<T, Compound> && type == "assembly");
 }
 
-/// Reads the shape or joint that the field "type" names.
+/// Reads a shape or joint whose type is in the field "type".
 template <class... Types>
 void read(const Json& json, const std::string& where, std::variant<Types...>& out) {
   ObjectReader object(json, where);
@@ -203,7 +203,7 @@ void read(const Json& json, const std::string& where, std::variant<Types...>& ou
   object.reject_unknown();
 }
 
-/// A body of a joint: its index in the scene.
+/// Reads a body of a joint: its index in the scene.
 void read(const Json& json, const std::string& where, BodyId& body) {
   body = {};
   read(json, where, body.index);
@@ -236,7 +236,7 @@ Scene scene_from(const Json& json) {
                                  std::to_string(kSceneSchemaVersion));
   }
   Scene scene;
-  if (version == 1) scene.solver = Solver::worst_first;  // the only one of that version
+  if (version == 1) scene.solver = Solver::worst_first;  // the only solver of that version
   object.fields(scene);
   if (const Json* pairs = object.find("ignored_pairs")) {
     read(*pairs, object.path("ignored_pairs"), scene.ignored_pairs);
@@ -276,7 +276,7 @@ void require_shallow(std::string_view text) {
   }
 }
 
-/// Parser callback that refuses a key that occurs twice in one object.
+/// Parser callback that rejects duplicate keys of an object.
 class UniqueKeys {
  public:
   bool operator()(int, Json::parse_event_t event, const Json& parsed) {
@@ -293,7 +293,7 @@ class UniqueKeys {
   }
 
  private:
-  std::vector<std::vector<std::string>> keys_;  ///< of the objects that enclose the current place
+  std::vector<std::vector<std::string>> keys_;  ///< of the enclosing objects
 };
 
 Json parse(std::string_view text) {

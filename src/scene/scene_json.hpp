@@ -1,4 +1,4 @@
-/// JSON form of a recording's header; jfpx/scene.hpp declares that of scenes.
+/// JSON form of a recording's header; jfpx/scene.hpp declares the JSON form of scenes.
 #pragma once
 
 #include <jfpx/recording.hpp>

@@ -14,8 +14,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Floating-point numbers are stored as Real, so that the shortest text that reads back to the same
-/// bits is written in either precision.
+/// Floating-point numbers are stored as Real, so that each precision writes the shortest text that
+/// reads back to the same bits.
 using SceneJson = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::string, bool,
                                        std::int64_t, std::uint64_t, Real>;
 

@@ -63,7 +63,7 @@ std::string find_centre_fault(const Compound& compound, Real mass) {
                "the origin, to a thousandth of the body's radius; centred() moves it there");
 }
 
-/// Checks what couples several fields, each of which must be in its range.
+/// Checks conditions between several fields, each of which must be in its range.
 std::string find_coupled_fault(const BodyDef& def) {
   std::string found = find_mass_fault(def.mass);
   if (!found.empty()) return found;

@@ -17,24 +17,24 @@ void validate_body(const BodyDef& def, std::uint64_t body);
 /// @throws InvalidScene if the number of bodies exceeds the range of SphereIndex
 void validate_body_count(std::uint64_t bodies);
 /// Checks that the coordinates are within kMaxCoordinate, the velocities are finite and the
-/// orientation has unit length to kUnitTolerance. Returns an empty string for a valid state, else a
-/// message with field, value and range, without the body.
+/// orientation has unit length to kUnitTolerance. Returns an empty string for a valid state,
+/// otherwise a message with field, value and range, without the body.
 std::string find_fault(const BodyState& state);
-/// Checks all fields of a joint, but not which bodies there are, with a result as above.
+/// Checks all fields of a joint, except the existence of its bodies. Result as above.
 std::string find_fault(const Joint& joint);
-/// Checks each field of a body alone, with a result as that of find_fault().
+/// Checks each field of a body separately. Result as above.
 std::string find_range_fault(const BodyDef& def);
-/// The same for one field.
+/// Checks one field. Result as above.
 template <class T>
 std::string find_range_fault(T BodyDef::*field, const std::type_identity_t<T>& value) {
   BodyDef def;
   def.*field = value;
   return find_range_fault(def);
 }
-/// Checks of what a range does not describe, with such results.
+/// Checks conditions that ranges do not describe. Results as above.
 JFPX_API std::string find_mass_fault(Real mass);
 std::string find_inertia_fault(const Mat3& inertia);
-/// Checks the inertia of a solid body of a valid shape that can be movable.
+/// Checks the inertia of a solid body with a valid shape that may be movable.
 std::string find_inertia_fault(const Shape& shape, Real mass);
 /// The shortest text that converts back to the same value.
 JFPX_API std::string to_text(Real value);

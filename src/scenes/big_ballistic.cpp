@@ -15,7 +15,7 @@ void set_demo_material(BodyDef* body) {
 }
 
 /// The numbers of the original, except the position: the original's crates start inside the ground
-/// and inside each other (E44); these stand on the ground, face to face.
+/// and inside each other (E44); these crates stand on the ground, face to face.
 BodyDef crate(Real z) {
   BodyDef def;
   def.shape = Box{{2, 2, 2}};

@@ -21,8 +21,8 @@ Compound cross(const Capsule& capsule) {
 
 }  // namespace
 
-/// Half of the bodies are the balls and boxes, the others alternate between capsules and crosses.
-/// They start on a lattice that is wide enough to separate all of them.
+/// One half of the bodies are balls and boxes, the other half alternates between capsules and
+/// crosses. They start on a lattice that separates all of them.
 Scene make_capsules(const Counts& counts) {
   constexpr Real kSpacing = Real(1.8);
   Scene scene;

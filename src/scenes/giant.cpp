@@ -5,8 +5,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace scenes {
 
-// The bed is a lattice that is four times as wide as high, in a box. The giant, of a thousandth of
-// the density of the grains, starts on top. It counts as one of the spheres.
+// The bed is a lattice in a box, four times as wide as high. The giant has a thousandth of the
+// density of the grains and starts on top. It counts as one of the spheres.
 Scene make_giant(const Counts& counts) {
   constexpr Real kGrain = Real(0.1), kGiant = 20, kSpacing = Real(2.05) * kGrain;
   Scene scene;

@@ -30,14 +30,14 @@ Scene in_open_box(const char* name, std::uint32_t count, const Sphere& sphere, R
   return scene;
 }
 
-/// @param length as for in_open_box()
+/// @param length see in_open_box()
 Scene heap(const char* name, const Counts& counts, Real length) {
   Random random(counts.seed);
   const auto ball = [&random](const Vec3& site) {
     const Real scale = random.uniform(Real(0.9), 1);
     BodyDef body =
         sphere_at(site + jitter(random, Real(0.04)), kRadius * scale, scale * scale * scale);
-    // For the resistance to rolling: without any, some spheres roll in their hollows without end.
+    // Resistance to rolling: otherwise some spheres roll in their hollows without end.
     body.angular_damping = Real(0.5);
     return body;
   };

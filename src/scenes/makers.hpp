@@ -1,4 +1,4 @@
-/// Factory functions of the named scenes, and the parts that they share.
+/// Factory functions of the named scenes, and shared parts.
 #pragma once
 
 #include <jfpx/random.hpp>
@@ -50,7 +50,7 @@ void add_ground(Scene& scene);
 void add_balls(Scene& scene, std::uint32_t count, const Vec3& target);
 /// Adds static boxes, 2 m thick, as walls around the inner box [lower, upper]: a floor, four sides,
 /// and a lid if `closed`.
-/// @param material the walls' friction, restitution and other fields besides mass, shape and
+/// @param material friction, restitution and all other fields of the walls except mass, shape and
 ///   position
 void add_container(Scene& scene, const Vec3& lower, const Vec3& upper, bool closed,
                    const BodyDef& material);

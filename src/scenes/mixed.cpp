@@ -15,9 +15,8 @@ BodyDef half_space(const Vec3& normal, Real offset) {
 
 }  // namespace
 
-// Bodies start on a lattice that is wide enough to separate all of them. Balls and boxes alternate
-// until one kind is used up. The pit is a floor with four walls that lean outwards with a slope of
-// 3 to 4.
+// Bodies start on a lattice that separates all of them. Balls and boxes alternate until one kind is
+// used up. The pit is a floor with four walls that lean outwards with a slope of 3 to 4.
 Scene make_mixed(const Counts& counts) {
   constexpr Real kSpacing = Real(1.8);  // the longest diagonal of a box is 1.74
   Scene scene;

@@ -5,7 +5,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace scenes {
 
-// The lowest row is as long as it must be for all boxes; the highest rows may be incomplete.
+// The lowest row is long enough for all boxes; the highest rows may be incomplete.
 Scene make_pyramid(const Counts& counts) {
   constexpr Real kGap = Real(0.05);  // between the crates of a row
   Scene scene;

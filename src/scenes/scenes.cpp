@@ -66,7 +66,7 @@ std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
 }
 
 void require_memory(std::uint64_t bodies) {
-  // Twice, because a world copies the bodies.
+  // Twice the size, because a world copies the bodies.
   const double needed = 2.0 * static_cast<double>(bodies) * sizeof(BodyDef);
   const double present =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
@@ -112,8 +112,8 @@ std::vector<SphereInstance> spheres_of(const Scene& scene) {
 
 std::vector<SphereInstance> random_spheres(std::uint32_t count, Real contacts_per_sphere,
                                            std::uint64_t seed) {
-  // At number density rho, a sphere of diameter 1 touches rho * 4/3 pi others on average, and two
-  // spheres share each contact.
+  // At number density rho, a sphere of diameter 1 touches rho * 4/3 pi others on average. Each
+  // contact belongs to two spheres.
   const double density =
       static_cast<double>(contacts_per_sphere) * 2 / (4.0 / 3.0 * 3.14159265358979);
   const Real width = static_cast<Real>(std::cbrt(static_cast<double>(count) / density));

@@ -16,7 +16,7 @@ namespace scenes {
 /// Parameters of a named scene.
 struct Options {
   std::optional<std::uint32_t> spheres = {};  ///< the scene's default if absent
-  std::optional<std::uint32_t> boxes = {};    ///< same default rule; only for scenes with boxes
+  std::optional<std::uint32_t> boxes = {};    ///< as for spheres; only for scenes with boxes
   std::uint64_t seed = 1;
 };
 
@@ -49,8 +49,8 @@ std::span<const Entry> all();
 
 /// Generates the scene called `name`. `lattice` rounds the number of spheres down to a cube.
 /// @throws InvalidArgument for an unknown name (the message lists the names), or if `boxes` is set
-///   for a scene without a variable number of boxes; OutOfMemory, with the required size and before
-///   any allocation, if the bodies would exceed the machine's memory.
+///   for a scene without a variable number of boxes; OutOfMemory with the required size, before any
+///   allocation, if the bodies would exceed the machine's memory
 Scene make(std::string_view name, const Options& options = {});
 
 /// The spheres of a scene, in the order of the bodies, as input for a SphereCollider.

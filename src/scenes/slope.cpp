@@ -5,8 +5,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace scenes {
 
-// With the friction of 0.5, the angle of friction is 26.565 degrees. The first slope has 25.565
-// degrees, the second 27.565. They descend along z. Boxes stand on both alternately, spheres roll.
+// The angle of friction for 0.5 is 26.565 degrees. The first slope has 25.565 degrees, the second
+// 27.565. Both descend along z. Boxes stand on both alternately; spheres roll.
 Scene make_slope(const Counts& counts) {
   struct Slope {
     Real sine, cosine, half_sine, half_cosine;  // of the angle and of its half

@@ -19,7 +19,7 @@ void set_material(BodyDef* body) {
 
 // The numbers of the original demo. The original applies damping twice per step (E18), jfpx once.
 // The ground is one half-space, and the resolver is limited to 8 iterations per body in each loop.
-// The thesis timed the demo without boxes; optional boxes fall in a second column beside the tower,
+// The thesis timed the demo without boxes. Optional boxes fall in a second column beside the tower,
 // as in the original.
 Scene make_boxes_and_balls(const Counts& counts) {
   Scene scene;

@@ -14,7 +14,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Work of find_touching(). The bytes are those of the first call with a list whose pairs all
+/// Work of find_touching(). The bytes are those of the first call with a list in which all pairs
 /// touch, because the changes and the touching pairs are unknown before the call.
 ColliderWork work_of(std::span<const SphereInstance> spheres, std::span<const SpherePair> pairs) {
   const auto n = static_cast<double>(spheres.size()), m = static_cast<double>(pairs.size());
@@ -28,8 +28,8 @@ std::size_t index_of(SphereAlgorithm algorithm) {
   return algorithm == SphereAlgorithm::all_pairs ? 0 : 1;
 }
 
-/// Ways that are predicted to take this many times as long as the fastest are not tried on a device
-/// that starts: all pairs of a million spheres would take minutes.
+/// Alternatives whose predicted time is this many times that of the fastest are not tried on a
+/// starting device: all pairs of a million spheres would take minutes.
 constexpr double kMaxSlowdown = 4;
 
 }  // namespace
@@ -38,7 +38,7 @@ AutomaticSphereCollider::Calls::Calls(std::vector<Way> ways_of_calls)
     : ways(std::move(ways_of_calls)), chooser([this] {
         std::vector<TimeChooser::Alternative> alternatives;
         for (const Way& way : ways) {
-          // No call of a device is short enough to share a decision.
+          // Device calls are too long to share a decision.
           const bool device = way.backend == Backend::cuda;
           alternatives.push_back({.dormant = device, .batched = !device});
         }
@@ -80,7 +80,7 @@ AutomaticSphereCollider::AutomaticSphereCollider(const SphereColliderOptions& op
   if (!with_cuda) starter_.cancel();
 }
 
-/// Whether the last decision also covers this call; then `calls.by` computes it.
+/// Whether the last decision also covers this call, which `calls.by` then computes.
 bool AutomaticSphereCollider::reuse_decision(Calls& calls, std::size_t spheres, std::size_t pairs) {
   if (calls.following > 0 && spheres == calls.spheres && pairs == calls.pairs) {
     --calls.following;
@@ -92,7 +92,7 @@ bool AutomaticSphereCollider::reuse_decision(Calls& calls, std::size_t spheres, 
   return false;
 }
 
-/// Executes `call` with the selected collider, and with the CPU if the device fails.
+/// Executes `call` with the selected collider, or with the CPU if the device fails.
 /// @param keep_input returns a function that repeats the call with a copy of its input
 template <class Call, class Measure, class KeepInput>
 auto AutomaticSphereCollider::compute(Calls& calls, const ColliderWork& expected, const Call& call,
@@ -190,8 +190,8 @@ std::span<const PairContact> AutomaticSphereCollider::find_touching(
   return found;
 }
 
-/// Given pairs can be tested by a collider with either algorithm. An existing one is preferred, so
-/// that no second thread pool or CUDA context is made.
+/// A collider with either algorithm can test given pairs. An existing collider is preferred, which
+/// avoids a second thread pool or CUDA context.
 SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorithm algorithm) {
   OfBackend& of_backend = colliders_[backend == Backend::cuda ? 1 : 0];
   if (algorithm == SphereAlgorithm::automatic) {
@@ -207,8 +207,8 @@ SphereCollider& AutomaticSphereCollider::collider(Backend backend, SphereAlgorit
   return *slot;
 }
 
-/// The other thread also repeats the current call, because the first one allocates memory of the
-/// device, pins memory of the host and loads the kernels.
+/// The other thread also repeats the current call, because the first call allocates device memory,
+/// pins host memory and loads the kernels.
 template <class KeepInput>
 void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
                                                       const ColliderWork& expected,
@@ -234,7 +234,7 @@ void AutomaticSphereCollider::start_device_if_it_pays(const Calls& calls,
       collider = make(options);
       try {
         repeat(*collider);
-      } catch (const InvalidArgument&) {  // of the caller, who gets the same exception
+      } catch (const InvalidArgument&) {  // also thrown to the caller
       }
     }
     return colliders;

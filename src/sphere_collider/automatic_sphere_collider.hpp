@@ -15,17 +15,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Makes the collider for the backend and algorithm in the options.
+/// Creates the collider for the backend and algorithm in the options.
 using SphereColliderMaker =
     std::function<std::unique_ptr<SphereCollider>(const SphereColliderOptions&)>;
 
 /// Forwards each call to one of up to four colliders (CPU and CUDA, with either algorithm), which
-/// are made when they are first needed. The device is started when the time that it would have
-/// saved so far reaches the cost of starting it: on another thread, while the CPU computes all
-/// calls, or in the call if that cost is 0. If there is no device, the CPU computes all calls and
-/// no failure is reported. If the device fails, also while it starts, the CPU computes that call
-/// and all later ones, and device_failure() reports it once. The destructor waits for the other
-/// thread.
+/// are created on first use. Starts the device when the accumulated time that it would have saved
+/// reaches the cost of the start. The start runs on another thread while the CPU computes all
+/// calls, or in the call if the cost is 0. If there is no device, the CPU computes all calls and no
+/// failure is reported. If the device fails, also during its start, the CPU computes that call and
+/// all later ones, and device_failure() reports it once. The destructor waits for the other thread.
 class AutomaticSphereCollider final : public SphereCollider {
  public:
   /// `options.backend` is `automatic`; `with_cuda` states whether `make` supports CUDA.
@@ -55,7 +54,7 @@ class AutomaticSphereCollider final : public SphereCollider {
 
     std::vector<Way> ways;
     TimeChooser chooser;  ///< alternative i is ways[i]
-    /// Number of further calls with the same counts that `by` computes without a new decision.
+    /// Number of following calls with the same counts that `by` computes without a new decision.
     int following = 0;
     std::size_t spheres = 0, pairs = 0;
     SphereCollider* by = nullptr;

@@ -13,15 +13,15 @@ struct BackendRow {
   Backend backend;
   bool compiled;
   BackendStatus (*probe)();  ///< does not throw for a missing device
-  /// The pool may be null; the CPU then has a pool of its own.
+  /// If the pool is null, the CPU backend creates its own pool.
   std::unique_ptr<SphereCollider> (*make_sphere_collider)(const SphereColliderOptions&,
                                                           ThreadPool* pool);
 };
 
-/// Makes a collider whose CPU backend runs on a given pool, which the caller shares with it,
+/// Creates a collider whose CPU backend runs on the given pool, which is shared with the caller,
 /// instead of on `options.threads` threads of its own.
 /// @param pool outlives the collider; calls of the collider and other uses must not overlap
-/// @throws as make_sphere_collider(options)
+/// @throws the exceptions of make_sphere_collider(options)
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
                                                      ThreadPool* pool);
 

@@ -1,4 +1,4 @@
-/// The reasons of a TimeChooser as those of the API.
+/// Conversion of the reasons of a TimeChooser to those of the API.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>

@@ -8,7 +8,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Returns the path of the file, in $XDG_CACHE_HOME/jfpx or ~/.cache/jfpx, with one name per
+/// Returns the path of the file in $XDG_CACHE_HOME/jfpx or ~/.cache/jfpx. The name depends on the
 /// precision. Empty if the environment defines neither folder.
 JFPX_API std::string cost_model_path();
 

@@ -80,7 +80,7 @@ std::string fault_of(const std::string& name, double value) {
 
 }  // namespace
 
-// Measured by jfpx calibrate on the machines that the header names. Costs of double are those of
+// Measured by jfpx calibrate on the machines named in the header. Costs of double are those of
 // data of twice the width.
 CostModel::CostModel() {
   constexpr double kWide = sizeof(Real) / 4.0;

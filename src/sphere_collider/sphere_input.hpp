@@ -29,8 +29,8 @@ inline bool is_valid(const SphereInstance& s) {
   return is_finite(s.centre) && is_finite(s.radius) && s.radius > 0;
 }
 
-/// @throws InvalidArgument with the first invalid sphere and field. If all spheres are valid, the
-/// caller has changed them during the search, which the message then reports.
+/// @throws InvalidArgument with the first invalid sphere and field. If all spheres are valid now,
+/// the message reports that the caller has changed them during the search.
 [[noreturn]] inline void reject_sphere(std::span<const SphereInstance> spheres) {
   const auto bad = std::find_if_not(spheres.begin(), spheres.end(), is_valid);
   if (bad == spheres.end()) throw InvalidArgument("a sphere was invalid when it was read");
@@ -70,7 +70,7 @@ inline void check_count(std::span<const SphereInstance> spheres) {
 }
 
 /// @throws InvalidArgument if there are too many spheres, or with the first sphere and field that
-/// find_contacts() does not accept.
+/// is invalid for find_contacts()
 /// @param pool null: in the calling thread
 inline void check_spheres(std::span<const SphereInstance> spheres, ThreadPool* pool = nullptr) {
   constexpr std::size_t kSpheresPerChunk = 8192;

@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace thesis {
 
-/// A search whose candidate pairs the collider tests. Buffers grow and never shrink.
+/// A search that tests its candidate pairs with the collider. Buffers grow and never shrink.
 class CandidateSearch : public BroadPhaseSearch {
  public:
   using BroadPhaseSearch::BroadPhaseSearch;

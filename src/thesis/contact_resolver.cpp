@@ -40,7 +40,7 @@ void ContactResolver::prepare(std::span<const Contact> contacts, std::size_t gen
   }
 }
 
-/// Appends a row, initially a patch of its own.
+/// Appends a row that initially is a separate patch.
 void ContactResolver::add_row(const Contact& c, const Vec3& arm_a, const Vec3& arm_b) {
   const MotionArrays& moving = bodies_->moving;
   Vec3 acceleration;
@@ -66,10 +66,10 @@ void ContactResolver::group_patches() {
   }
 }
 
-/// Where boxes touch along a face, all corners with key > slack are corrected together. The weight
-/// of a corner is key - slack; the amount is the weighted mean of these values, applied at the
+/// If boxes touch along a face, all corners with key > slack are corrected together. The weight of
+/// a corner is key - slack; the amount is the weighted mean of these values, applied at the
 /// weighted centre of the corners. If corners were corrected one after the other, each impulse
-/// would rotate the box onto the next corner, and a box at rest would drift. Velocities are linear
+/// would rotate the box onto the next corner, and a resting box would drift. Velocities are linear
 /// in the arm, so the mean is exact at the centre. A corner with a key above the mean remains the
 /// worst and has more weight in the next iteration.
 /// @param slack part of the key that is not corrected

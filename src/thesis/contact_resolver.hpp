@@ -27,14 +27,15 @@ struct ResolverReport {
 /// E11). The key of a contact is its penetration in the first loop, and the required change of its
 /// separating velocity in the second.
 ///
-/// The queue selects the largest key, and the lowest index among equal keys, as the linear scan of
-/// the thesis does. Buffers grow and never shrink.
+/// The queue selects the largest key, and the lowest index among equal keys, like the linear scan
+/// of the thesis. Buffers grow and never shrink.
 class ContactResolver {
  public:
   /// @param contacts between `bodies`. Two movable bodies in contact must be both awake or both
   ///   asleep. Contacts without an awake body are ignored.
-  /// @param generated number of contacts, at the end of `contacts`, that come from contact
-  ///   generators. They act at Contact::point, even on spheres, and form no patches.
+  /// @param generated number of contacts of contact generators at the end of `contacts`. They act
+  /// at
+  ///   Contact::point, even on spheres, and form no patches.
   ResolverReport resolve(BodyStore& bodies, std::span<const Contact> contacts,
                          const ResolverSettings& settings, std::size_t generated = 0);
 
@@ -42,8 +43,7 @@ class ContactResolver {
   struct alignas(64) Row {  // a cache line in float, two in double
     std::uint32_t a, b;
     Vec3 normal, arm_a, arm_b;  ///< arms: from the centre of mass to the contact
-    Real from_acceleration;     ///< [m/s], part of the separating velocity that this step's
-                                ///< accelerations have added
+    Real from_acceleration;     ///< [m/s], change of the separating velocity by accelerations
     Real friction, restitution;
     std::uint32_t first, last;  ///< rows of the same two bodies with the same normal: [first, last)
   };

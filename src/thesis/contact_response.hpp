@@ -18,9 +18,9 @@ JFPX_HD constexpr Vec3 point_velocity(const Vec3& velocity, const Vec3& angular_
 
 /// Required change of the separating velocity of a contact [m/s]; none if <= 0.
 /// @param separating       relative velocity along the normal; negative: closing
-/// @param from_acceleration contribution of this step's accelerations to it; restitution does not
-///   apply to this part, or a body at rest would bounce on its weight
-/// @param bounce_threshold lowest closing speed that restitution applies to
+/// @param from_acceleration part of it due to this step's accelerations; without restitution,
+///   because a body at rest would otherwise bounce on its weight
+/// @param bounce_threshold lowest closing speed with restitution
 JFPX_HD constexpr Real target_delta_velocity(Real separating, Real from_acceleration,
                                              Real restitution, Real bounce_threshold) {
   const Real impact = from_acceleration < 0 ? separating - from_acceleration : separating;
@@ -60,8 +60,9 @@ JFPX_HD inline Vec3 contact_impulse(const Mat3& response, const Vec3& velocity, 
   if (!(planar > stop.x * friction)) return stop;
 
   Real y = stop.y / planar, z = stop.z / planar;
-  // Friction opposes the sliding velocity that the normal impulse alone leaves. For spheres this is
-  // the direction of `stop`; the rotation of a corner deflects `stop`, and would waste friction.
+  // Friction opposes the sliding velocity that remains after the normal impulse alone. For spheres
+  // this is the direction of `stop`; the rotation of a corner deflects `stop`, which would waste
+  // friction.
   const Real normal_impulse = target / along_normal;
   const Real slip_y = velocity.y + response(1, 0) * normal_impulse;
   const Real slip_z = velocity.z + response(2, 0) * normal_impulse;

@@ -38,8 +38,8 @@ std::uint64_t ContactSearch::find_contacts(const BodyStore& bodies, ContactFinde
 }
 
 /// Appends the contacts of two spheres to `contacts`, and the pairs with another solid to
-/// candidates_. In a pair of the collider, a < b, and spheres have the lowest numbers; so b is no
-/// sphere if either is none.
+/// candidates_. In a pair of the collider, a < b, and spheres have the lowest numbers. Therefore b
+/// is the other solid, if any.
 void ContactSearch::find_sphere_pairs(const BodyStore& bodies, ContactFinder* finder,
                                       std::vector<Contact>* contacts) {
   const ContactSpan found = finder->broad_phase().find(finder->sub_shapes().bounds());

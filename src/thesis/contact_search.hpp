@@ -13,9 +13,9 @@ namespace thesis {
 /// Owns its buffers, which grow and never shrink.
 class ContactSearch {
  public:
-  /// Finds the contacts of the current poses: those of two spheres, then all others, both sorted by
-  /// (a.index, b.index), then by the sub-shapes of a and of b. Contact defines which body is a.
-  /// Friction and restitution are left 0.
+  /// Finds the contacts at the current poses: contacts of two spheres, then all others, both sorted
+  /// by (a.index, b.index), then by the sub-shapes of a and of b. Contact defines which body is a.
+  /// Friction and restitution are 0.
   /// @param contacts empty; receives the contacts
   /// @returns the number of contacts of two spheres
   /// @throws the exceptions of SphereCollider::find_contacts()

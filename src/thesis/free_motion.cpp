@@ -32,8 +32,8 @@ void move(std::uint32_t i, BodyStore* bodies) {
   bodies->refresh_inertia(i);
 }
 
-/// Recency-weighted mean of v.v + w.w. `kept` is bias^dt. The cap bounds the time that a fast body
-/// stays awake after it has stopped.
+/// Recency-weighted mean of v.v + w.w. `kept` is bias^dt. The upper limit bounds the time that a
+/// fast body stays awake after it has stopped.
 Real mean_motion(Real mean, const Vec3& velocity, const Vec3& angular_velocity, Real kept,
                  Real cap) {
   const Real now = length_squared(velocity) + length_squared(angular_velocity);
@@ -62,8 +62,8 @@ void FreeMotion::integrate(BodyStore* bodies) const {
   }
 }
 
-/// Updates the mean motion and puts the body to sleep if it is small. Must be called before move():
-/// the velocity already contains the gravity of this step, and a body at rest that moved by it
+/// Updates the mean motion, and puts the body to sleep if the mean is small. Must be called before
+/// move(): the velocity already contains the gravity of this step, and a resting body that moved
 /// before falling asleep would remain deeper in the ground.
 bool FreeMotion::falls_asleep(std::uint32_t i, MotionArrays* moving) const {
   Real& mean = moving->mean_motion[i];

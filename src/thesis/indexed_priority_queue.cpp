@@ -38,7 +38,7 @@ void IndexedPriorityQueue::find_winner(std::size_t level, std::uint32_t node) {
       best[i] = best[i] > best[i + half] ? best[i] : best[i + half];
     }
   }
-  // The lowest position with that key, again without branches.
+  // The lowest position with that key, also branch-free.
   std::array<std::uint8_t, kChildren> lost;
   for (std::uint32_t i = 0; i < kChildren; ++i) lost[i] = key[i] == best[0] ? 0 : 0xff;
   const auto eights = std::bit_cast<std::array<std::uint64_t, 2>>(lost);

@@ -1,5 +1,5 @@
-/// A priority queue of the numbers 0..n-1 with mutable keys: largest key first; of equal keys, the
-/// lowest number first, as in a linear scan.
+/// A priority queue of the numbers 0..n-1 with mutable keys: largest key first; among equal keys,
+/// the lowest number first, as in a linear scan.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -13,9 +13,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// A tournament tree (Knuth, The Art of Computer Programming 3, 5.2.3, trees of selection) with
-/// sixteen children per node. Most updates do not change the winner of a node and end there, where
-/// a binary heap would move entries. Only a smaller key of a winner requires a comparison of all
-/// children, which lie in one cache line. Buffers grow and never shrink.
+/// sixteen children per node. Most updates do not change the winner of a node and stop there; a
+/// binary heap would move entries. Only a smaller key of a winner requires a comparison of all
+/// children, which are in one cache line. Buffers grow and never shrink.
 class IndexedPriorityQueue {
  public:
   /// Replaces all keys, in O(n). @param keys not empty, no NaN
@@ -41,15 +41,15 @@ class IndexedPriorityQueue {
  private:
   static constexpr std::uint32_t kChildren = 16;
 
-  /// Level 0 holds the leaves, each further level the parents of the level below. Levels are padded
-  /// to a multiple of kChildren with keys that never win.
+  /// Level 0 contains the leaves, each further level the parents of the level below. Levels are
+  /// padded to a multiple of kChildren with keys that never win.
   struct Level {
     std::vector<Real> key;             ///< largest key of the subtree
     std::vector<std::uint8_t> winner;  ///< child with that key; empty in level 0
   };
 
-  /// Updates the parent, in `level`, of a child whose key has become `key`. Returns false if
-  /// nothing changes for the levels above.
+  /// Updates the parent, in `level`, of a child whose key has changed to `key`. Returns false if
+  /// the levels above do not change.
   bool update_parent(std::size_t level, std::uint32_t child, Real key) {
     const std::uint32_t parent = child / kChildren, position = child % kChildren;
     Real& best = levels_[level].key[parent];
@@ -65,7 +65,7 @@ class IndexedPriorityQueue {
   }
   void find_winner(std::size_t level, std::uint32_t node);
 
-  std::vector<Level> levels_;  ///< those from count_ on are unused and keep their memory
+  std::vector<Level> levels_;  ///< levels from count_ on are unused and keep their memory
   std::size_t count_ = 0;
 };
 

@@ -1,5 +1,5 @@
-/// Resolution of particle contacts: the deepest first, then the one with the largest target change
-/// of velocity. Each correction updates the other contacts of its particles.
+/// Resolution of particle contacts: deepest contact first, then largest target change of velocity
+/// first. Each correction updates the other contacts of its particles.
 #include "src/thesis/particle_resolver.hpp"
 
 #include "src/thesis/contact_response.hpp"

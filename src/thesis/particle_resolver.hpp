@@ -7,10 +7,10 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Owns buffers, which grow and never shrink.
+/// Owns its buffers, which grow and never shrink.
 class ParticleResolver {
  public:
-  /// Counts its iterations in *report.
+  /// Adds its iterations to *report.
   void resolve(ParticleStore& particles, std::span<const ParticleContact> contacts,
                const ParticleSettings& settings, ParticleReport* report);
 

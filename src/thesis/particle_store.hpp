@@ -18,7 +18,8 @@ struct ParticleMotion {
   std::vector<Vec3> force;     ///< [N], for the next step
 };
 
-/// Owns the particles, their ids and their free motion. Loops visit ids(), in the order of indices.
+/// Owns the particles, their ids and their free motion. Loops iterate over ids(), in the order of
+/// indices.
 class ParticleStore {
  public:
   explicit ParticleStore(Real dt) : dt_(dt) {}
@@ -26,7 +27,7 @@ class ParticleStore {
   /// @param def must have passed validation
   /// @throws std::bad_alloc without a change
   ParticleId add(const ParticleDef& def);
-  /// @param id must be contained
+  /// @param id of a particle in the store
   void remove(ParticleId id) noexcept { pool_.remove(id); }
   bool contains(ParticleId id) const noexcept { return pool_.contains(id); }
   std::span<const ParticleId> ids() const noexcept { return pool_.ids(); }

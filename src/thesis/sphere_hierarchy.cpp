@@ -266,7 +266,7 @@ void SphereHierarchy::add_pairs_between(Index a, Index b, std::vector<SpherePair
     if (touch(first.sphere, second.sphere)) pairs->push_back({std::min(a, b), std::max(a, b)});
     return;
   }
-  // Descend into the larger node: its children are more likely to be clear of the other.
+  // Descends into the larger node: its children are more likely to be separate from the other node.
   const bool split_first =
       second.is_leaf() || (!first.is_leaf() && first.bounds.radius > second.bounds.radius);
   const Index whole = split_first ? b : a;

@@ -12,12 +12,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// A binary tree of bounding spheres (thesis 4.4.5). Each node encloses its two children, and a new
-/// leaf descends to the child whose sphere grows least. Leaf bounds include some slack, so that a
-/// small motion changes no other node. A subtree that becomes unbalanced is rebuilt, which keeps
-/// the depth below 2.5 log2(size) + 2 (scapegoat tree, Galperin and Rivest 1993). Query results
-/// depend on the spheres alone, not on the history of the tree. Buffers grow and never shrink.
-/// Const functions may run concurrently with each other; every other function excludes all other
-/// calls.
+/// leaf descends to the child whose sphere grows least. Leaf bounds include slack, so that a small
+/// motion changes no other node. An unbalanced subtree is rebuilt, which keeps the depth below
+/// 2.5 log2(size) + 2 (scapegoat tree, Galperin and Rivest 1993). Query results depend only on the
+/// spheres, not on the history of the tree. Buffers grow and never shrink. Const functions may run
+/// concurrently with each other; every other function excludes all other calls.
 class SphereHierarchy {
  public:
   /// Identifies a sphere in the tree until it is removed.

@@ -8,8 +8,8 @@ inline namespace JFPX_ABI {
 namespace {
 
 /// Calls pass(contact) for all contacts, repeatedly, until a sweep changes nothing; `pass` returns
-/// true if it has changed a body. Contacts are sorted by body index, so a forward sweep propagates
-/// along chains of increasing indices, and a backward sweep along decreasing ones.
+/// true if it has changed a body. Contacts are sorted by body index: a forward sweep propagates
+/// along chains of increasing indices, a backward sweep along decreasing ones.
 template <class Pass>
 void propagate(std::span<const Contact> contacts, const Pass& pass) {
   for (bool changed = true; changed;) {

@@ -13,8 +13,8 @@ class WakePropagation {
  public:
   /// Wakes every movable body in contact with an awake body, transitively (thesis 4.4.6,
   /// matchAwakeState). Immovable bodies are never awake and do not propagate waking. Bodies in
-  /// contact with a moving kinematic body, directly or through other movable bodies, are kept awake
-  /// at any speed: a sleeping body has no velocity and could not be carried.
+  /// contact with a moving kinematic body, directly or through other movable bodies, stay awake at
+  /// any speed, because a sleeping body would not be carried.
   void operator()(std::span<const Contact> contacts, BodyStore* bodies);
 
  private:

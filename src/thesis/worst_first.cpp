@@ -21,7 +21,7 @@ inline namespace JFPX_ABI {
 namespace thesis {
 namespace {
 
-/// The first body that is_in_world() refuses.
+/// The first body for which is_in_world() is false.
 std::optional<BodyId> find_runaway(const BodyStore& store) {
   for (const BodyId id : store.ids()) {
     if (!is_in_world(store.state(id.index))) return id;
@@ -42,7 +42,7 @@ class WorstFirst final : public WorstFirstStep {
   ContactSearch search_;
   WakePropagation propagate_waking_;
   ContactResolver resolver_;
-  std::vector<Contact> resolved_;  ///< in a world with sensors: the contacts of other bodies
+  std::vector<Contact> resolved_;  ///< without contacts of sensors; used in a world with sensors
 };
 
 /// Integration, then detection, then resolution (thesis 4.3).
@@ -72,7 +72,7 @@ bool WorstFirst::advance(WorldAccess::Impl* world, StepReport* report) {
   return true;
 }
 
-/// Detects the contacts of the current poses and calls the contact generators.
+/// Detects the contacts at the current poses and calls the contact generators.
 void WorstFirst::find_contacts(WorldAccess::Impl* world, StepReport* report) {
   world->start_detection();
   world->contacts.last.get([&](ContactList* list) {
@@ -86,7 +86,7 @@ void WorstFirst::find_contacts(WorldAccess::Impl* world, StepReport* report) {
   world->finish_detection(report);
 }
 
-/// The contacts that wake bodies and are resolved: all but those of sensors, in the same order.
+/// The contacts that wake bodies and are resolved: all except those of sensors, in the same order.
 std::span<const Contact> WorstFirst::contacts_to_resolve(WorldAccess::Impl* world) {
   const std::vector<Contact>& all = world->contact_list().contacts;
   if (!world->store.has_sensors()) return all;

@@ -15,11 +15,12 @@ bullet::SceneWorld make_bullet_world(EngineKind kind, const Scene& scene,
 std::uint64_t count_contacts(bullet::SceneWorld& world);
 /// Measures of the last step. Contact points with a positive distance are not penetrations.
 StepMeasures measures_of(bullet::SceneWorld& world);
-/// Name of the backend that tested the sphere pairs of the last dispatch, or "Bullet" if the
-/// dispatch was left to Bullet's own code.
+/// Name of the backend that tested the sphere pairs of the last dispatch, or "Bullet" if Bullet's
+/// own code ran the dispatch.
 std::string sphere_backend(const bullet::SceneWorld& world);
 
-/// Reason why the CPU replaced a device in the dispatcher or the solver; empty if it did not.
+/// Reason why the CPU replaced a device in the dispatcher or the solver; empty if none was
+/// replaced.
 std::string device_failure(const bullet::SceneWorld& world);
 
 }  // namespace tool

@@ -1,4 +1,4 @@
-/// jfpx calibrate: measures the costs that the automatic choice of backend and algorithm uses.
+/// jfpx calibrate: measures the costs for the automatic selection of backend and algorithm.
 #include <jfpx/backend.hpp>
 
 #include "src/sphere_collider/cost_cache.hpp"

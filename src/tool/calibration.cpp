@@ -81,15 +81,16 @@ class Bench {
     return samples;
   }
 
-  /// Samples of find_touching(), for lists of which half of the pairs touch. The `copied` numbers
-  /// of spheres, each with one pair, measure the cost of copying bytes.
+  /// Samples of find_touching(), for lists in which half of the pairs touch. Lists of the `copied`
+  /// numbers of spheres, each with one pair, measure the cost of copying bytes.
   std::vector<CostSample> given(Backend backend, std::span<const std::uint32_t> copied) {
     const auto collider = make_sphere_collider({.backend = backend});
     std::vector<CostSample> samples;
     const auto measure = [&](std::span<const SphereInstance> spheres,
                              std::span<const SpherePair> pairs) {
-      // The mirror image has the same contacts, but differs in every sphere and pair. A device
-      // receives only differences from the previous call, so alternating calls copy all bytes.
+      // The mirror image has the same contacts, but differs in every sphere and pair. Only
+      // differences from the previous call are copied to a device, so alternating calls copy all
+      // bytes.
       std::vector<SphereInstance> mirrored(spheres.begin(), spheres.end());
       for (SphereInstance& s : mirrored) s.centre = -s.centre;
       std::vector<SpherePair> exchanged(pairs.begin(), pairs.end());
@@ -123,7 +124,7 @@ class Bench {
     std::vector<CostSample> samples;
     for (const std::uint32_t n : sizes) {
       Scene scene = scenes::make("lattice", {.spheres = n});
-      // Half of the distance of neighbours: the balls touch, and nothing moves them apart.
+      // Half of the distance of neighbours: the balls touch, and nothing separates them.
       for (BodyDef& body : scene.bodies) body.shape = Sphere{Real(0.485)};
       scene.sleep.enabled = false;
       World world(scene, {.collider = {.backend = backend}});
@@ -193,8 +194,8 @@ void measure_cuda(Bench& bench, CostModel* costs) {
   costs->cuda_world = fit_costs(bench.world(Backend::cuda, kBodiesForDevice), kWorldTerms);
 }
 
-/// Measures a device, which may be missing or fail at any time, without losing the CPU's costs.
-/// @return the reason why it could not be measured; empty if it was
+/// Measures a device, which may be missing or fail at any time, and keeps the CPU's costs.
+/// @return the reason why the device was not measured; otherwise empty
 template <class Measure>
 std::string try_device(const Measure& measure) {
   try {

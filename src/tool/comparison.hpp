@@ -7,14 +7,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// Results of a comparison. `stock` and `jfpx` are two Bullet worlds that differ in their parts.
+/// Results of a comparison. `stock` and `jfpx` are two Bullet worlds with different parts.
 struct Comparison {
   /// Contacts of find_contacts() compared with the sphere-sphere manifolds of stock Bullet.
   std::uint64_t contacts_compared = 0;
   std::uint64_t contact_mismatches = 0;
   std::string first_contact_mismatch;  ///< description; empty if there is none
-  /// The first difference between the two Bullet worlds. After each step the manifolds are compared
-  /// in order, and in them every field of every point; then the transforms and the velocities.
+  /// The first difference between the two Bullet worlds. After each step, compares the manifolds in
+  /// order with every field of every point, then the transforms and the velocities.
   std::string first_difference;
   std::uint64_t hash_native = 0, hash_stock = 0, hash_jfpx = 0;
   std::uint64_t contacts_native = 0, contacts_stock = 0, contacts_jfpx = 0;  ///< summed over steps

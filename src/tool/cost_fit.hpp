@@ -16,7 +16,7 @@ struct CostSample {
 };
 
 /// Fits the terms in `which`, constrained to be nonnegative, by least squares of the relative
-/// errors; all other terms are those of `known`.
+/// errors. All other terms have the values of `known`.
 CostTerms fit_costs(std::span<const CostSample> samples, std::span<double CostTerms::*const> which,
                     const CostTerms& known = {});
 

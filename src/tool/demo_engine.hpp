@@ -12,9 +12,9 @@ namespace tool {
 
 /// Runs the selected demo, or the selected scene as a demo, with the inputs of a script.
 /// @param script path of an input script; empty: no inputs
-/// @param start receives the initial scene of the demo, which has no bodies if the demo has no
-/// scene
-/// @throws InvalidArgument, also for options that a demo does not have; FileError; as load()
+/// @param start receives the initial scene of the demo; without bodies if the demo has no scene
+/// @throws InvalidArgument, also for options that demos do not support; FileError; the exceptions
+///   of load()
 std::unique_ptr<Engine> make_demo_engine(const RunOptions& options, const std::string& script,
                                          Scene* start);
 

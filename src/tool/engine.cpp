@@ -16,8 +16,8 @@ inline namespace JFPX_ABI {
 namespace tool {
 namespace {
 
-/// Read once, because a command may create several engines and must print the warning once. A
-/// machine that was not measured is the normal case and not a reason for a warning.
+/// Read once, because a command may create several engines and must print a warning once. A
+/// machine without measured costs is normal and causes no warning.
 const CostModel& costs_of_this_machine(bool quiet) {
   static const CostModel costs = [quiet] {
     const CalibratedCosts cached = calibrated_costs();

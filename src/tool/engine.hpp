@@ -26,8 +26,8 @@ nlohmann::ordered_json to_json_value(const StageTimes& times);
 
 /// Measures of the last step.
 struct StepMeasures {
-  /// [m], >= 0, of the contact points as detected in the step, without those of sensors; 0 without
-  /// contacts.
+  /// [m], >= 0, of the contact points detected in the step, without those of sensors; 0 without
+  /// contacts
   Real deepest_penetration = 0, mean_penetration = 0;
   Real largest_speed = 0;  ///< [m/s], of the movable bodies after the step
 };
@@ -58,14 +58,14 @@ class Engine {
   virtual std::uint32_t awake() const = 0;     ///< number of movable bodies awake
   virtual StepMeasures measures() const = 0;   ///< computed by each call
   virtual StageTimes times() const = 0;        ///< of the last step
-  /// The world of the native engine; null for others and for demos.
+  /// The world of the native engine; null for other engines and for demos.
   virtual World* world() { return nullptr; }
-  virtual std::string backend() const = 0;  ///< computed the sphere contacts of the last step
+  virtual std::string backend() const = 0;  ///< that computed the sphere contacts of the last step
   /// Name of the native resolver; empty for Bullet and for demos without a world.
   virtual std::string resolver() const { return {}; }
   /// The backend, its algorithm and the reason for the choice, as a table entry.
   virtual std::string choice() const { return backend(); }
-  /// Reason why the CPU replaced a device at some step; empty if it did not.
+  /// Reason why the CPU replaced a device in any step; empty if none was replaced.
   virtual std::string device_failure() const { return {}; }
   /// Reason why the run can't continue meaningfully; empty if it can.
   virtual std::string trouble() const { return {}; }

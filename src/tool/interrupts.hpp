@@ -15,9 +15,9 @@ struct Interrupted {
   int signal;
 };
 
-/// Defers SIGHUP, SIGINT and SIGTERM to the next call of check() during its lifetime; a second
-/// signal ends the process immediately. Signals that were ignored at the start of the process stay
-/// ignored. Only one object may exist at a time, in one thread.
+/// During its lifetime, defers SIGHUP, SIGINT and SIGTERM to the next call of check(); a second
+/// signal ends the process immediately. Signals that were ignored at the start of the process
+/// remain ignored. Only one object may exist at a time, in one thread.
 class Interrupts {
  public:
   Interrupts();

@@ -24,7 +24,7 @@ namespace {
 
 using namespace jfpx;
 
-/// Names an unknown command or option, which CLI11 reports as a missing command.
+/// Message for an unknown command or option, which CLI11 reports as a missing command.
 std::string what_is_wrong(const CLI::App& app, const CLI::Error& error) {
   const std::vector<std::string> unknown = app.remaining(true);
   if (!app.get_subcommands().empty() || unknown.empty()) return error.what();
@@ -32,14 +32,14 @@ std::string what_is_wrong(const CLI::App& app, const CLI::Error& error) {
   return fmt::format("there is no {} \"{}\"", word.starts_with('-') ? "option" : "command", word);
 }
 
-/// Flushes stdout and reports output that could not be written.
+/// Flushes stdout and reports write errors.
 int finish_output(int status) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
   fmt::print(stderr, "jfpx: stdout can't be written: {}\n", std::strerror(errno));
   return status == tool::kSuccess ? tool::kBadUsage : status;
 }
 
-/// Inserts "--" before the program of `preload`, because the options after it are the program's.
+/// Inserts "--" before the program of `preload`, because later options belong to the program.
 std::vector<std::string> separate_program(const CLI::App& app, std::vector<std::string> arguments) {
   const CLI::App* command = nullptr;
   for (auto it = arguments.begin(); it != arguments.end() && *it != "--"; ++it) {

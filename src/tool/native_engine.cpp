@@ -47,7 +47,7 @@ class NativeEngine final : public Engine {
 
 StepMeasures measures_of(const World& world, const StepReport& report) {
   Penetrations penetrations;
-  // Contacts of generators follow the detected ones; a failed step has none.
+  // Contacts of generators follow the detected contacts; a failed step has no contacts.
   const std::span<const Contact> contacts = world.contacts();
   for (const Contact& c : contacts.first(std::min<std::size_t>(report.contacts, contacts.size()))) {
     if (!c.sensor) penetrations.add(c.distance);

@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
 
-/// Accepts whole numbers up to `largest`. CLI11 alone parses -1 and values out of range as the
+/// Accepts whole numbers up to `largest`. CLI11 alone would parse -1 and values out of range as the
 /// largest integer.
 CLI::Validator whole_number(std::uint64_t largest = std::numeric_limits<std::uint64_t>::max());
 /// Adds --threads.

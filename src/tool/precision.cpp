@@ -28,7 +28,7 @@ std::string selected_precision(const std::vector<std::string>& arguments) {
   constexpr std::string_view kOption = "--precision";
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string_view argument = arguments[i];
-    if (argument == "--") break;  // the remaining arguments belong to another program
+    if (argument == "--") break;  // later arguments belong to another program
     if (argument == kOption && i + 1 < arguments.size()) return arguments[i + 1];
     if (argument.starts_with(kOption) && argument.substr(kOption.size()).starts_with("=")) {
       return std::string(argument.substr(kOption.size() + 1));
@@ -37,7 +37,7 @@ std::string selected_precision(const std::vector<std::string>& arguments) {
   if (arguments.size() < 2 || arguments[0] != "replay") return {};
   for (std::size_t i = 1; i < arguments.size(); ++i) {
     if (arguments[i] == "--from") {
-      ++i;  // a snapshot, not the recording
+      ++i;  // a snapshot, not a recording
       continue;
     }
     if (!arguments[i].starts_with('-') && std::filesystem::is_regular_file(arguments[i])) {

@@ -15,13 +15,13 @@ namespace tool {
 inline constexpr std::string_view kPrecision = sizeof(Real) == 4 ? "float" : "double";
 
 /// Replaces this process by the program of the given precision, "float" or "double", with the same
-/// arguments. Returns if this program has that precision, or if there is no such precision.
-/// Two programs are necessary because Bullet's float and double libraries export the same symbols.
-/// @throws Error if the other program is not in the same folder.
+/// arguments. Returns if this program has that precision, or if the precision is unknown. Two
+/// programs are necessary because Bullet's float and double libraries export the same symbols.
+/// @throws Error if the other program is not in the same folder
 void switch_precision(const std::string& precision, char** argv);
-/// The same for the precision that the arguments select: by --precision, or by `replay` of a
-/// recording. @throws also FileError for an invalid recording.
-/// @param arguments those of `argv` after the name of the program; the ones after "--" are ignored
+/// Calls switch_precision() if the arguments select a precision: by --precision, or by `replay` of
+/// a recording. @throws also FileError for an invalid recording
+/// @param arguments those of `argv` after the program name; arguments after "--" are ignored
 void switch_precision_if_requested(const std::vector<std::string>& arguments, char** argv);
 
 }  // namespace tool

@@ -62,7 +62,7 @@ void set_environment(const PreloadOptions& options) {
 }
 
 [[noreturn]] void start(const PreloadOptions& options) {
-  // Checked here, where it is an error: inside the program it could only be a warning.
+  // Checked here as an error; inside the program, only a warning would be possible.
   if (options.backend == "cuda") (void)make_sphere_collider({.backend = Backend::cuda});
   set_environment(options);
   std::vector<std::string> command = options.command;

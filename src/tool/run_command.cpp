@@ -68,7 +68,7 @@ std::string summary(const CommandOptions& options, const Scene& scene, const Eng
 nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene& scene,
                                      const Engine& engine, const Totals& totals) {
   const StepMeasures m = engine.measures();
-  nlohmann::ordered_json resolver;  // null for an engine without one
+  nlohmann::ordered_json resolver;  // null for an engine without a resolver
   if (!engine.resolver().empty()) resolver = engine.resolver();
   return {{"scene", scene.name},
           {"bodies", engine.states().size()},
@@ -152,7 +152,7 @@ int run(const CommandOptions& options) {
   return report_trouble(engine->device_failure(), engine->trouble());
 }
 
-/// Rejects options of one engine for the others.
+/// Rejects options of other engines.
 void check_engine(const CLI::App& command, const CommandOptions& options) {
   const auto require = [&](EngineKind engine, std::initializer_list<const char*> names) {
     if (options.engine == to_string(engine)) return;

@@ -21,7 +21,7 @@ bool looks_like_file(const std::string& name) {
          std::filesystem::exists(name);
 }
 
-/// The first option given that applies to named scenes only; nullptr if there is none.
+/// The first given option that applies to named scenes only; nullptr if there is none.
 const char* option_of_named_scenes(const RunOptions& options) {
   if (options.spheres) return "--spheres";
   if (options.boxes) return "--boxes";

@@ -56,13 +56,12 @@ struct RunOptions {
 inline bool wants_table(const RunOptions& options) {
   return !options.quiet && options.json != "-" && options.csv != "-";
 }
-/// @throws InvalidArgument if stdout would receive JSON or CSV, and something else.
+/// @throws InvalidArgument if stdout would receive JSON or CSV together with other output
 void check_stdout(const RunOptions& options);
 
 /// The options of a named scene.
 scenes::Options scene_options(const RunOptions& options);
-/// The option given that a demo does not have, as it applies to scenes only; nullptr if there is
-/// none.
+/// The first given option that applies to scenes only, not to demos; nullptr if there is none.
 const char* option_of_scenes(const RunOptions& options);
 /// Loads or generates the scene and applies the options to it.
 /// @throws InvalidArgument, InvalidScene, FileError, OutOfMemory

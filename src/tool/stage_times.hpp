@@ -1,4 +1,4 @@
-/// Durations of a step by stage, of all engines.
+/// Durations of the stages of a step, for all engines.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -17,7 +17,7 @@ struct StageTimes {
 
 /// Of a native step.
 StageTimes stage_times(const StepReport& report);
-/// Why a world can't continue meaningfully after a step; empty if it can.
+/// Reason why a world can't continue meaningfully after a step; empty if it can.
 std::string trouble_of(const StepReport& report);
 
 /// Of a step of bullet::SceneWorld. @tparam BulletTimes bullet::StageTimes

@@ -26,7 +26,7 @@ std::unique_ptr<Viewer> start(const ViewOptions& options) {
   return viewer;
 }
 
-/// Makes SIGHUP end a run as SIGINT and SIGTERM do, which SDL converts to events.
+/// Makes SIGHUP end a run like SIGINT and SIGTERM, which SDL converts to events.
 void handle_hang_up() {
   struct sigaction action {};
   sigaction(SIGHUP, nullptr, &action);

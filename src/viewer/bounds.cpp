@@ -17,7 +17,7 @@ constexpr std::size_t kSampled = 4000;
 struct Spread {
   Real low, high;
 };
-/// The range of the values without 2 % of them at each end. Reorders the values.
+/// The range of the values, excluding 2 % at each end. Reorders the values.
 Spread spread(std::vector<Real>& values) {
   const std::size_t left_out = values.size() / 50;
   const auto low = values.begin() + static_cast<std::ptrdiff_t>(left_out);

@@ -23,7 +23,7 @@ class BoundsEstimator {
  public:
   explicit BoundsEstimator(const Scene& scene);
 
-  /// The bounds without the outermost 2 % of the sample at each end of each axis.
+  /// The bounds, excluding the outermost 2 % of the sample at each end of each axis.
   Bounds bounds(const std::vector<BodyState>& states) const;
 
  private:
@@ -31,7 +31,7 @@ class BoundsEstimator {
   Real largest_ = 0;  ///< radius of the largest body [m]
 };
 
-/// The bounds of a scene that are needed only once.
+/// The bounds of a scene, for a single use.
 inline Bounds bounds_of(const Scene& scene, const std::vector<BodyState>& states) {
   return BoundsEstimator(scene).bounds(states);
 }

@@ -84,7 +84,7 @@ class BulletRun final : public Run {
     return bullet::SceneWorld(scene, options);
   }
 
-  // Each of the three parts leaves work below its minimum batch to Bullet's own code. The choices
+  // Each of the three parts lets Bullet's own code do work below its minimum batch. The choices
   // therefore differ in three numbers only and share the state of Bullet.
   void apply_choice() {
     const auto minimum = [this](bool jfpx) {

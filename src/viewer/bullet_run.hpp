@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Options for a world with all of jfpx's parts, and the backend and threads of a choice.
+/// Options for a world with all of jfpx's parts, with the backend and threads of a choice.
 bullet::SceneWorldOptions world_options(const EngineChoice& choice);
 
 RunState run_state_of(bullet::SceneWorld& world, std::uint64_t step);

@@ -47,7 +47,7 @@ void Camera::move(Real right, Real up, Real forward_distance) {
   eye_.y += up;
 }
 
-// Computing the eye from the focus rounds, so a camera at rest must return early to keep its bits.
+// A camera at rest must return early to keep its bits: computing the eye from the focus rounds.
 void Camera::orbit(Real yaw, Real pitch) {
   if (yaw == 0 && pitch == 0) return;
   const Vec3 centre = focus();

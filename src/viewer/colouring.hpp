@@ -1,4 +1,4 @@
-/// Colours that show a property of each body: its speed, sleep, penetration, contacts or island.
+/// Colours that represent a property of each body: speed, sleep, penetration, contacts or island.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -14,20 +14,20 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// The property that the colours of bodies show; `bodies` only distinguishes bodies.
+/// The property that the colours represent; `bodies` only distinguishes bodies.
 enum class Colouring : std::uint8_t { bodies, speed, sleep, penetration, contacts, islands };
 inline constexpr const char* kColouringNames[] = {"bodies",      "speed",    "sleep",
                                                   "penetration", "contacts", "islands"};
 
-/// One value in [0, 1] per body, scaled by the largest value of the state where the property
-/// has no natural scale; empty for Colouring::bodies and Colouring::islands.
+/// One value in [0, 1] per body. Properties without a natural scale are divided by the largest
+/// value of the state. Empty for Colouring::bodies and Colouring::islands.
 std::vector<Real> colour_values(const Scene& scene, const RunState& run_state, Colouring colouring);
 
 /// The lowest body index in the island of each body. Islands consist of movable bodies connected by
-/// contacts; a body without mass connects nothing, or the ground would merge all islands on it.
+/// contacts. Bodies of mass 0 connect nothing; otherwise the ground would merge all islands on it.
 std::vector<std::uint32_t> islands_of(const Scene& scene, std::span<const Contact> contacts);
 
-/// One colour per body: equal within an island, grey for a body that is alone.
+/// One colour per body: equal within an island, grey for an isolated body.
 std::vector<Paint> island_paints(const Scene& scene, std::span<const Contact> contacts);
 
 /// One colour per body; empty for Colouring::bodies.

@@ -122,7 +122,7 @@ std::span<const KeyHelp> key_help() {
 
 void Controls::set_demo_keys(std::vector<std::string> names) {
   demo_names_ = std::move(names);
-  // A pressed key may now belong to the demo, which would receive its release.
+  // A pressed key may now be a key of the demo, which would receive its release.
   down_.reset();
   touched_.reset();
 }
@@ -134,7 +134,8 @@ void Controls::handle(const SDL_Event& event, bool keyboard, bool mouse) {
       break;
     case SDL_KEYDOWN:
     case SDL_KEYUP:
-      // A release is processed even while the panel captures the keyboard, or the key would stick.
+      // Releases are processed even while the panel captures the keyboard; otherwise keys would
+      // stick.
       if (keyboard || event.type == SDL_KEYUP) key(event.key);
       break;
     case SDL_MOUSEBUTTONDOWN:

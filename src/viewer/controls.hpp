@@ -38,7 +38,7 @@ enum class Command : std::uint8_t {
   fullscreen,
 };
 
-/// Features that only some viewers have.
+/// Optional features of viewers.
 enum class Feature : std::uint8_t { none, picking, history, colouring, saving };
 
 /// One line of the help.
@@ -53,8 +53,8 @@ struct Click {
   int x, y;
 };
 
-/// Press or release of a key of a demo. The name is SDL's name of the key at that position of a US
-/// keyboard, in lower case.
+/// Press or release of a key of a demo. The name is SDL's lower-case name of the key at that
+/// position on a US keyboard.
 struct DemoKey {
   std::string name;
   bool pressed;
@@ -62,12 +62,12 @@ struct DemoKey {
 
 /// Processes every event in order: a key that is pressed and released between two frames still acts
 /// once (erratum E42). Unknown keys are ignored. Keys for walking and keys of demos are identified
-/// by their position (scancode), so that they are adjacent on any keyboard layout; other keys are
-/// identified by their label (keycode).
+/// by position (scancode), so that they are adjacent on any keyboard layout; other keys by label
+/// (keycode).
 class Controls {
  public:
-  /// Sets the keys of a demo, which take_demo_keys() returns instead of moving the camera. Keys
-  /// that are down stop moving it.
+  /// Sets the keys of a demo, which take_demo_keys() returns instead of moving the camera. Pressed
+  /// keys no longer move the camera.
   void set_demo_keys(std::vector<std::string> names);
   /// @param keyboard, mouse false while the panel captures the device
   void handle(const SDL_Event& event, bool keyboard = true, bool mouse = true);

@@ -28,8 +28,8 @@ std::unique_ptr<demos::Demo> make_demo(const ViewOptions& options) {
                                          .world = world_settings(options.choice)});
 }
 
-/// Draws the acceleration of each body by forces in the last step, weight included. An acceleration
-/// of kGravity has the length kWeight.
+/// Draws the acceleration of each body by forces in the last step, including its weight. An
+/// acceleration of kGravity has the length kWeight.
 void draw_forces(const World& world, Drawing* drawing) {
   constexpr Real kWeight = 3, kGravity = Real(9.81), kLongest = 20;
   for (const BodyId id : world.bodies()) {
@@ -56,8 +56,7 @@ Paint paint_of(const demos::Colour& colour, bool ball) {
   return paint;
 }
 
-/// True if the items of two pictures correspond by index, which holds until one is added or
-/// removed.
+/// True if the items of two pictures correspond by index, that is, if no item was added or removed.
 bool same_items(const demos::View& a, const demos::View& b) {
   return a.items.size() == b.items.size() &&
          std::equal(a.items.begin(), a.items.end(), b.items.begin(),

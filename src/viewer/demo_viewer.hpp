@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 namespace view {
 
 /// Adds the items of a demo, interpolated between two of its pictures. Omits flattened shapes,
-/// which were shadows in the thesis: the renderer computes shadows.
+/// which are shadows in the thesis, because the renderer computes shadows.
 void draw_demo(const demos::View& from, const demos::View& to, Real share, Drawing* drawing);
 /// Bounding sphere of the items of a demo.
 Bounds bounds_of(const demos::View& view);

@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 namespace view {
 namespace {
 
-/// Scenes with fewer bodies are drawn from the host, where a picture can show more of them.
+/// Scenes with fewer bodies are drawn from the host, where pictures can show more properties.
 constexpr std::size_t kFewestBodies = 100000;
 
 bool is_movable(const BodyDef& body) { return body.mass > 0; }

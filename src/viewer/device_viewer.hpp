@@ -11,21 +11,21 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// How a DeviceViewer makes its world; tests supply others.
+/// Creation of the world of a DeviceViewer; tests replace it.
 struct DeviceRun {
   std::function<World(const Scene&)> make_world;
   std::function<std::unique_ptr<ResidentSpheres>(World*, const std::vector<Ball>&)> make_spheres =
       make_world_spheres;
 };
 
-/// Copies no states to the host while it steps and draws. It has no history, colours of properties,
-/// contacts and forces, and does not interpolate between steps.
+/// Steps and draws without copying states to the host. Has no history, no colours of properties, no
+/// contacts and forces, and no interpolation between steps.
 class DeviceViewer final : public Viewer {
  public:
-  /// @param scene must suit(): its balls are drawn, and its immovable bodies
+  /// @param scene must satisfy suits(); its balls and immovable bodies are drawn
   DeviceViewer(ViewOptions options, const Scene& scene, DeviceRun run);
 
-  /// Whether every body is a movable ball, or immovable.
+  /// Whether every body is a movable ball or immovable.
   static bool suits(const Scene& scene);
 
   void step() override;

@@ -71,7 +71,7 @@ struct GroundItem {
 class ResidentSpheres;
 
 /// Content of one picture. Positions are given in world coordinates and stored relative to the eye,
-/// which preserves precision far from the origin.
+/// to preserve precision far from the origin.
 class Drawing {
  public:
   explicit Drawing(const Vec3& eye) : eye_(eye) {}
@@ -99,9 +99,9 @@ class Drawing {
                 std::uint8_t alpha = 255);
   /// Adds the plane dot(normal, p) = offset with a grid; it is invisible from below.
   void add_ground(const Vec3& normal, Real offset, Real cell, Paint paint);
-  /// Draws these spheres, too; null for none. They are neither sorted nor clipped by distance.
+  /// Sets additional spheres; null for none. They are neither sorted nor clipped by distance.
   void set_resident(ResidentSpheres* spheres) { resident_ = spheres; }
-  /// Sets a bounding sphere of everything that casts shadows.
+  /// Sets a bounding sphere of all shadow casters.
   void set_bounds(const Vec3& centre, Real radius);
   /// Sets the typical size of a body, which is the radius of ambient occlusion [m].
   void set_detail(Real metres) { detail_ = static_cast<float>(metres); }

@@ -13,9 +13,9 @@ inline namespace JFPX_ABI {
 namespace view {
 
 /// Mean force on each body in the step between two states of a run, without its weight [N]: the
-/// mass times the change of velocity that the body's own acceleration does not explain. A body at
-/// rest has the supporting force, a freely falling body has none. The definition is independent of
-/// the engine. Zero if there is no step between the states of a run.
+/// mass times the change of velocity, minus the part due to the body's own acceleration. It is the
+/// supporting force for a body at rest, and zero for a freely falling body. The definition is
+/// independent of the engine. Zero if there is no step between the states of a run.
 std::vector<Vec3> forces_between(const Scene& scene, const RunState& before, const RunState& now);
 
 /// Adds an arrow with its tail at `from`.

@@ -1,4 +1,4 @@
-/// The uniform block that all shaders share.
+/// The uniform block shared by all shaders.
 #include "src/viewer/frame_block.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-/// The uniform block that all shaders share: shaders/frame.glsl.
+/// The uniform block shared by all shaders: shaders/frame.glsl.
 #pragma once
 
 #include "src/viewer/renderer.hpp"

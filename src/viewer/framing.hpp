@@ -8,8 +8,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Shows all movable bodies from the front, the right and above. Shows only the lower part of a
-/// tower that is too tall for its bodies to be visible. --eye and --target take precedence.
+/// A camera that shows all movable bodies from the front, the right and above, or only the lower
+/// part of a tower that is too tall for visible bodies. --eye and --target take precedence.
 Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunState& run_state);
 
 }  // namespace view

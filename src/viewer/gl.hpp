@@ -32,7 +32,7 @@ class GlName {
   GLuint name_ = 0;
 };
 
-// Wrappers, because epoxy's functions are pointers that are set at the first call.
+// Wrappers, because epoxy's functions are pointers that are set on the first call.
 inline void release_buffer(GLuint name) { glDeleteBuffers(1, &name); }
 inline void release_array(GLuint name) { glDeleteVertexArrays(1, &name); }
 inline void release_texture(GLuint name) { glDeleteTextures(1, &name); }

@@ -23,9 +23,9 @@ struct Image {
   }
 };
 
-/// Writes a PNG file completely or not at all. @throws FileError
+/// Writes a PNG file atomically. @throws FileError
 void write_png(const Image& image, const std::string& path);
-/// Checks that write_png() can write the file, without creating it. @throws FileError as
+/// Checks that write_png() can write the file, without creating it. @throws FileError like
 /// write_png()
 void require_writable(const std::string& path);
 /// @throws FileError
@@ -46,7 +46,7 @@ class ImageSequenceWriter {
   unsigned frames_ = 0;
 };
 
-/// The first of STEM-1, STEM-2, ... with the ending that does not exist yet.
+/// The first name of STEM-1, STEM-2, ... with the ending that does not exist yet.
 std::string free_name(const std::string& stem, const std::string& ending);
 
 }  // namespace view

@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// A vertex array over one buffer of items, which advances once per instance.
+/// A vertex array over one buffer of items, which advances by one item per instance.
 class Instances {
  public:
   /// Location of a field in an item. Bytes are normalized to [0, 1].

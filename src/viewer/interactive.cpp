@@ -84,7 +84,7 @@ void App::read_events() {
   }
 }
 
-/// Configures the controls for a new viewer, and starts its recording if the options request one.
+/// Configures the controls for a new viewer, and starts its recording if requested by the options.
 void App::attach_viewer() {
   controls_.set_demo_keys(viewer_->demo_keys());
   controls_.orbit = !viewer_->walks();
@@ -276,8 +276,8 @@ void App::draw(double seconds) {
   apply_panel_requests();
 }
 
-/// Draws requested pictures offscreen in the last size of the window, because a minimised window
-/// has no pixels.
+/// Draws requested pictures offscreen in the last window size, because a minimised window has no
+/// pixels.
 void App::draw_minimised(double seconds) {
   if (requested_picture_.empty() && !image_sequence_.on()) {
     SDL_Delay(20);

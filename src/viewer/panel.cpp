@@ -34,7 +34,7 @@ bool slide(const char* label, Real* value, float low, float high) {
   return ImGui::IsItemDeactivatedAfterEdit();
 }
 
-/// A field for a number of 32 bits. @return true when the user leaves it after a change
+/// A field for a 32-bit number. @return true when the user leaves it after a change
 bool count(const char* label, std::uint32_t* value) {
   std::uint64_t number = *value;
   const bool changed = widget::number(label, &number);
@@ -156,7 +156,7 @@ void SceneViewer::show_engine_choice() {
 
 void SceneViewer::show_settings() {
   if (!widget::heading("Settings", false)) return;
-  // An active widget holds the user's value, which takes effect when the widget is released.
+  // An active widget has the user's value, which takes effect when the widget is released.
   if (!ImGui::IsAnyItemActive()) settings_field_ = player_.settings();
   bool changed = slide("dt [s]", &settings_field_.dt, 1e-4f, 0.05f);
   if (player_.choice().engine == EngineKind::native) changed |= show_resolver_settings();
@@ -170,7 +170,7 @@ void SceneViewer::show_settings() {
   message.clear();
 }
 
-/// Shows the choice of the resolver and the settings that it uses. @return true if one has changed
+/// Shows the choice of the resolver and its settings. @return true if one has changed
 bool SceneViewer::show_resolver_settings() {
   int chosen = static_cast<int>(settings_field_.solver);
   for (int i = 0; i < static_cast<int>(std::size(tool::kResolverNames)); ++i) {

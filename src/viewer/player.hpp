@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Settings that can be changed while a scene runs.
+/// Settings that can be changed during a run.
 struct RunSettings {
   Real dt = 0;  ///< [s]
   Solver solver = Solver::soft_step;
@@ -29,18 +29,19 @@ class Player {
 
   Player(std::unique_ptr<Run> run, Scene scene);
 
-  /// Advances one step in the history or, at its end, computes one. Does nothing at_end().
+  /// Advances one step in the history or, at its end, computes one. Has no effect if at_end().
   void step();
   /// True at the end of a recording.
   bool at_end() const { return !in_the_past() && run_->at_end(); }
   /// Shows the previous step of the history. Computed steps are kept: stepping forward again shows
   /// the same bits. @return false at the oldest step
   bool step_back();
-  /// Restarts with the current engine and settings. @throws as make_run(); nothing has changed then
+  /// Restarts with the current engine and settings. @throws the exceptions of make_run(), without a
+  /// change
   void restart();
 
-  /// Continues with another engine or backend. @return true if the bits are those of an
-  /// uninterrupted run. @throws BackendUnavailable; nothing has changed then
+  /// Continues with another engine or backend. @return true if the bits equal those of an
+  /// uninterrupted run. @throws BackendUnavailable, without a change
   bool switch_to(const EngineChoice& choice);
   EngineChoice choice() const { return run_->choice(); }
   /// Writes the states of all steps, for `jfpx replay`.
@@ -57,7 +58,7 @@ class Player {
     return {scene_.dt, scene_.solver, scene_.soft_step, scene_.resolver, scene_.sleep};
   }
   /// Continues from the newest state with other settings.
-  /// @throws InvalidScene, BackendUnavailable; nothing has changed then
+  /// @throws InvalidScene, BackendUnavailable, without a change
   void set_settings(const RunSettings& settings);
 
   const RunState& shown() const { return history_[shown_]; }

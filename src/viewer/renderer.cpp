@@ -82,8 +82,8 @@ void bind_texture(GLenum unit, const GlTexture& texture) {
 
 void draw_screen() { glDrawArrays(GL_TRIANGLES, 0, 3); }
 
-/// The view with a near plane that does not clip anything at the distance `nearest` or beyond, even
-/// in the corners.
+/// The view with a near plane that clips nothing at the distance `nearest` or beyond, even in the
+/// corners.
 View clear_of(float nearest, View view, Real aspect) {
   const Real tangent = std::tan(view.fov_y / 2);
   const Real to_corner = std::sqrt(1 + tangent * tangent * (1 + aspect * aspect));
@@ -120,7 +120,7 @@ struct Renderer::Impl {
   GlVertexArray empty = make_vertex_array();
   DrawOrder order;
   SphereInstances spheres, resident_spheres;
-  std::unique_ptr<SharedBuffer> resident_buffer;  ///< that of resident_spheres
+  std::unique_ptr<SharedBuffer> resident_buffer;  ///< of resident_spheres
   BoxInstances boxes, glass;
   RoundedInstances rounded_boxes;
   LineInstances lines;
@@ -204,7 +204,7 @@ struct Renderer::Impl {
     glViewport(0, 0, shadow_map->size, shadow_map->size);
     glClear(GL_DEPTH_BUFFER_BIT);
     if (quality.shadow_size == 0) return;
-    glEnable(GL_DEPTH_CLAMP);  // casters between the sun and the shadow map count
+    glEnable(GL_DEPTH_CLAMP);  // includes casters between the sun and the shadow map
     draw_bodies(kShadowPass);
     glDisable(GL_DEPTH_CLAMP);
   }

@@ -1,4 +1,4 @@
-/// Spheres in device memory that a picture draws in addition to the items of its Drawing.
+/// Spheres in device memory that are drawn in addition to the items of a Drawing.
 #pragma once
 
 #include <jfpx/cuda/sphere_collider.hpp>
@@ -17,9 +17,9 @@ namespace view {
 class SharedBuffer {
  public:
   virtual ~SharedBuffer() = default;
-  /// Memory of the device, valid in the order of the stream until the next unmap().
+  /// Returns device memory, valid in the order of the stream until the next unmap().
   virtual void* map(cuda::Stream stream) = 0;
-  /// Completes the write, after which OpenGL may use the buffer.
+  /// Completes the write; OpenGL may then use the buffer.
   virtual void unmap(cuda::Stream stream) = 0;
 };
 
@@ -32,7 +32,7 @@ class ResidentSpheres {
   virtual std::unique_ptr<SharedBuffer> share(GLuint buffer) = 0;
   /// Writes all items, relative to the eye.
   virtual void write(SharedBuffer* buffer, const Vec3& eye) = 0;
-  /// Reason why the items are copied through the host; empty if they are not. Known after share().
+  /// Reason why the items are copied through the host; otherwise empty. Valid after share().
   virtual const std::string& host_copy_reason() const = 0;
 };
 

@@ -17,14 +17,14 @@ namespace view {
 using tool::EngineKind;
 
 /// The engine of a run and its settings. Another choice with the same kind of engine and the same
-/// number of threads keeps the bits.
+/// number of threads preserves the bits.
 struct EngineChoice {
   EngineKind engine = EngineKind::native;
   /// Of native steps; in Bullet, of sphere contacts and of jfpx's solver.
   Backend backend = Backend::automatic;
   unsigned threads = 1;                        ///< on the CPU, fixed for a run; 0: one per core
   bool jfpx_solver = true, jfpx_world = true;  ///< parts of EngineKind::bullet; false: Bullet's
-  std::size_t minimum_batch = 0;               ///< smaller work is left to Bullet's own code
+  std::size_t minimum_batch = 0;               ///< Bullet's own code does smaller work
   friend bool operator==(const EngineChoice&, const EngineChoice&) = default;
 };
 
@@ -32,15 +32,15 @@ class Run {
  public:
   virtual ~Run() = default;
   virtual void step() = 0;
-  /// True at the end of a recording, after which no step follows.
+  /// True after the last step of a recording.
   virtual bool at_end() const { return false; }
   virtual RunState run_state() = 0;
   /// Returns to the first step. @return false if the caller must create a new run instead.
   virtual bool rewind() { return false; }
   virtual EngineChoice choice() const = 0;
-  /// Continues with another choice. The internal state of the engine is kept, and so are the bits.
-  /// @return false if another engine is necessary; the run is unchanged
-  /// @throws BackendUnavailable; the run is unchanged
+  /// Continues with another choice. Preserves the internal state of the engine and the bits.
+  /// @return false, without a change, if another engine is necessary
+  /// @throws BackendUnavailable, without a change
   virtual bool switch_to(const EngineChoice& choice) = 0;
 };
 
@@ -54,7 +54,7 @@ struct Recorded {
 };
 /// @throws FileError
 Recorded open_recording(const std::string& path);
-/// True if the name of a scene is that of a recording, which ends with ".rec".
+/// True for the path of a recording, which ends with ".rec".
 bool is_recording(std::string_view scene);
 
 /// True if this build contains the engine.

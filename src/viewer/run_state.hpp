@@ -1,4 +1,4 @@
-/// State of a run after a step: everything that a picture or the panel shows.
+/// State of a run after a step: all data for a picture or the panel.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -21,7 +21,7 @@ struct RunState {
   std::vector<std::uint8_t> awake;  ///< in the same order, 1 or 0
   std::vector<Contact> contacts;    ///< BodyId::index is the index in the scene
   tool::StageTimes times;
-  std::uint32_t substeps = 0;    ///< of the native resolver soft-step; 0: another one
+  std::uint32_t substeps = 0;    ///< of the native resolver soft-step; otherwise 0
   std::uint64_t iterations = 0;  ///< of the native resolver worst-first, both loops
   std::string computed_by;       ///< backend of a native step, or of the sphere contacts
   std::string solved_by;         ///< backend of Bullet's solver; empty for a native run

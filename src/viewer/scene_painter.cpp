@@ -73,8 +73,7 @@ std::optional<ScenePainter::Wall> ScenePainter::wall_of(std::uint32_t body,
 }
 
 // Large axis-aligned boxes around the movable bodies are the walls of a room. They are drawn as
-// glass and clipped to the inside, so that the inside is visible. The largest box on a side is the
-// wall.
+// glass and clipped to the inside, which is thus visible. The largest box on a side is the wall.
 void ScenePainter::find_room() {
   std::vector<BodyState> states;
   for (const BodyDef& body : scene_.bodies) states.push_back({body.position, {}, {}, {}});
@@ -138,7 +137,7 @@ void ScenePainter::draw_still(const Bounds& bounds, Drawing* drawing) const {
       drawing->add_ground(plane->normal, plane->offset, cell, kGroundPaint);
     }
     if (const Plane* plane = std::get_if<Plane>(&body.shape)) {
-      // Visible from the side of the bodies only, so that it does not hide them.
+      // Visible only from the side of the bodies, which are thus never hidden.
       const bool front = dot(plane->normal, bounds.centre) >= plane->offset;
       const Vec3 normal = front ? plane->normal : -plane->normal;
       drawing->add_ground(normal, front ? plane->offset : -plane->offset, cell, kGroundPaint);

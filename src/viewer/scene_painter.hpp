@@ -15,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Adds the bodies of a scene to a drawing. Holds the properties that are constant during a run.
+/// Adds the bodies of a scene to a drawing. Stores the properties that are constant during a run.
 class ScenePainter {
  public:
   explicit ScenePainter(Scene scene);
@@ -24,7 +24,7 @@ class ScenePainter {
   /// @param share position of the picture between the states of a run, in [0, 1]
   void draw(const RunState& from, const RunState& to, Real share, Colouring colouring,
             Drawing* drawing) const;
-  /// Adds grounds, walls and immovable bodies alone. @param bounds of the movable bodies
+  /// Adds grounds, walls and immovable bodies only. @param bounds of the movable bodies
   void draw_immovable(const Bounds& bounds, Drawing* drawing) const;
   /// Adds the normals and points of contacts as lines. @param red draws them as errors
   void draw_contacts(const std::vector<Contact>& contacts, bool red, Drawing* drawing) const;
@@ -43,7 +43,7 @@ class ScenePainter {
   Paint paint(std::uint32_t body) const;
   /// Radius of a typical movable body [m].
   Real body_size() const { return body_size_; }
-  /// Radius that nine in ten movable bodies do not exceed [m].
+  /// Radius that 90 % of the movable bodies do not exceed [m].
   Real large_size() const { return large_size_; }
   const Scene& scene() const { return scene_; }
   /// Bounds of the movable bodies.
@@ -52,8 +52,8 @@ class ScenePainter {
   }
 
  private:
-  /// The properties of a body that drawing needs: compact, so that those of a hundred thousand
-  /// bodies fit in the cache.
+  /// The properties of a body for drawing. Compact, so that those of a hundred thousand bodies fit
+  /// into the cache.
   struct Appearance {
     enum class Kind : std::uint8_t { hidden, still, moving, moving_ball } kind;
     Paint paint;

@@ -9,7 +9,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Distance along the unit direction of a ray at which it enters a shape; kMaxReal if the ray
+/// Distance along the unit direction of a ray at which it enters a shape. kMaxReal if the ray
 /// misses the shape or the shape lies behind its origin. Planes are never hit, because they do not
 /// move.
 Real ray_distance(const Shape& shape, const BodyState& state, const Vec3& from,

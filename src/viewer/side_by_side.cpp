@@ -1,5 +1,4 @@
-/// Viewer of native jfpx, stock Bullet and Bullet with jfpx in lockstep, with all differences
-/// marked.
+/// Viewer of native jfpx, stock Bullet and Bullet with jfpx in lockstep, with marked differences.
 #include <jfpx/bullet/scene_world.hpp>
 #include <jfpx/bullet/verify.hpp>
 
@@ -26,7 +25,7 @@ namespace {
 enum Column : std::size_t { kNative, kStock, kJfpx, kColumns };
 constexpr std::array<const char*, kColumns> kTitles = {"native jfpx", "stock Bullet",
                                                        "Bullet with jfpx"};
-/// Colours of the paths of native jfpx and of Bullet; both Bullet columns share one.
+/// Colours of the paths of native jfpx and of Bullet; both Bullet columns have the same colour.
 constexpr std::array<Paint, 2> kTrails = {{{255, 170, 40}, {90, 190, 255}}};
 constexpr std::size_t kTraced = 6;     // number of bodies with drawn paths
 constexpr std::size_t kTrail = 240;    // steps of a path
@@ -56,7 +55,7 @@ struct Trio {
   bullet::SceneWorld stock, jfpx;
   bullet::ContactCheck check;
   std::array<RunState, kColumns> before, now;
-  std::vector<Contact> different;  ///< contacts of the last step that only one Bullet world has
+  std::vector<Contact> different;  ///< contacts of the last step in only one Bullet world
   std::uint64_t differences = 0;   ///< of all steps
   std::string first_difference;
   std::array<std::vector<float>, kColumns> energies;
@@ -203,8 +202,8 @@ void SideBySide::draw(Renderer& renderer, const Target& target) {
     if (forces) painter_.draw_forces(trio_->before[column], now, &drawing);
     if (column != kNative) painter_.draw_contacts(trio_->different, true, &drawing);
     draw_trails(&drawing);
-    // Equal widths, because the renderer recreates its buffers when the size changes. The columns
-    // may overlap by a pixel.
+    // Equal widths, because the renderer recreates its buffers when the size changes. Columns may
+    // overlap by a pixel.
     const int width = (target.width + 2) / 3;
     const int left = (target.width - width) * static_cast<int>(column) / 2;
     renderer.draw(drawing, view, {left, strip, width, top_height, target.unit}, target.framebuffer);
@@ -250,7 +249,7 @@ void SideBySide::draw_plots(const Target& target, int top_height) const {
   const auto plot = [&](const char* id, const std::vector<float>& values, const std::string& text) {
     const std::size_t first = values.size() > kPlotted ? values.size() - kPlotted : 0;
     ImGui::BeginGroup();
-    ImGui::AlignTextToFramePadding();  // aligns the first text with the others
+    ImGui::AlignTextToFramePadding();  // aligns the first text with later texts
     ImGui::TextUnformatted(text.c_str());
     ImGui::PlotLines(id, values.data() + first, static_cast<int>(values.size() - first), 0, nullptr,
                      FLT_MAX, FLT_MAX, {width, height});

@@ -1,4 +1,4 @@
-/// Conversion of wall time to fixed steps and the fraction of the next one.
+/// Conversion of wall time to fixed steps and a fraction of the next step.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -12,12 +12,12 @@ namespace view {
 
 class StepClock {
  public:
-  /// Number of steps per picture that are computed regardless of their duration.
+  /// Number of steps per picture that are computed even beyond the budget.
   static constexpr std::uint64_t kSureSteps = 8;
 
-  /// Advances by `seconds` and computes the steps of length `dt` that are due, at most `max_steps`.
-  /// Drops steps beyond the time budget, so that a slow machine shows slow motion instead of
-  /// freezing. Negative and non-finite times count as zero.
+  /// Advances by `seconds` and computes the due steps of length `dt`, at most `max_steps`. Drops
+  /// steps beyond the time budget, so that a slow machine shows slow motion instead of freezing.
+  /// Negative and non-finite times count as zero.
   void advance(double seconds, double dt, std::uint64_t max_steps,
                const std::function<void()>& step);
   /// Position in the shown step, in [0, 1].

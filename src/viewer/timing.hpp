@@ -1,5 +1,5 @@
-/// Durations of steps and pictures for the summary of a run, as in the thesis' comparison with
-/// rendering on and off.
+/// Durations of steps and pictures for the summary of a run, which compares rendering on and off as
+/// in the thesis.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -28,7 +28,7 @@ class Timing {
   std::uint64_t steps_ = 0;
 };
 
-/// The median; the mean of the two middle values of an even number; 0 for no values.
+/// The median; for an even number of values, the mean of the two middle values; 0 without values.
 double median(std::vector<double> values);
 
 }  // namespace view

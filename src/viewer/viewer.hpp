@@ -26,10 +26,10 @@ class Viewer {
  public:
   virtual ~Viewer() = default;
 
-  /// Advances wall time and computes the steps that are due, at most `max_steps`. Pauses at_end().
+  /// Advances wall time and computes the due steps, at most `max_steps`. Pauses if at_end().
   void advance(double seconds, std::uint64_t max_steps = std::numeric_limits<std::uint64_t>::max());
-  virtual void step() = 0;                       ///< one step; none at_end()
-  virtual bool at_end() const { return false; }  ///< true if no step follows
+  virtual void step() = 0;                       ///< computes one step; none if at_end()
+  virtual bool at_end() const { return false; }  ///< whether there is no further step
   virtual void step_back() {}
   virtual void restart() = 0;
   virtual void home() = 0;  ///< resets the camera to show everything
@@ -49,10 +49,10 @@ class Viewer {
   virtual bool walks() const { return false; }
   /// Writes the states of all steps. @throws InvalidArgument if that is impossible; FileError
   virtual void save_recording(const std::string& path) const;
-  /// Writes each following step. Call before the first step. @throws as save_recording(); so does
-  /// step()
+  /// Writes each following step. Call before the first step.
+  /// @throws the exceptions of save_recording(), here and in step()
   virtual void record_to(const std::string& path);
-  /// Completes the file of record_to(), if any. @throws as save_recording()
+  /// Completes the file of record_to(), if any. @throws the exceptions of save_recording()
   virtual void finish_recording() {}
 
   virtual double dt() const = 0;                      ///< [s], of the next step
@@ -61,7 +61,7 @@ class Viewer {
   virtual Real body_size() const = 0;                 ///< [m]
   virtual std::string summary() const { return {}; }  ///< printed at the end
 
-  /// The exit status so far. A failure persists after a restart.
+  /// The exit status so far. A restart does not clear a failure.
   int status() const { return failed_ ? tool::kCheckFailed : tool::kSuccess; }
 
   Camera camera;

@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace view {
 
-/// Content of the panels, for tests. The last of several widgets with the same label is kept.
+/// Content of the panels, for tests. Among widgets with the same label, the last one is recorded.
 struct PanelLog {
   struct Widget {
     float left = 0, top = 0, right = 0, bottom = 0;  ///< visible rectangle [units]
@@ -39,8 +39,8 @@ bool check(const char* label, bool* on);
 bool radio(const char* label, int* value, int own);
 /// Logarithmic scale. True whenever the value changes.
 bool slider(const char* label, float* value, float low, float high, const char* format);
-/// True if the field was edited and has lost the focus. Text that is not a number leaves the value
-/// unchanged.
+/// True if the field was edited and has lost the focus. Text that is not a number does not change
+/// the value.
 bool number(const char* label, std::uint64_t* value);
 /// True while the section is open.
 bool heading(const char* label, bool open_at_first);

@@ -25,15 +25,15 @@ constexpr Uint32 kPause = 8;  // [ms] between pictures without vertical synchron
 struct Extent {
   int width = 0, height = 0;
 };
-/// The size of a window, in units or pixels as `query` returns it.
+/// The size of a window, in the units or pixels of `query`.
 Extent size_by(void (*query)(SDL_Window*, int*, int*), SDL_Window* window) {
   Extent extent;
   query(window, &extent.width, &extent.height);
   return extent;
 }
 
-/// Keeps the driver loaded, so that the leak sanitizer finds Mesa's memory in use and reports only
-/// leaks of this project. Mesa frees its memory when the driver is unloaded, or never.
+/// Keeps the driver loaded: Mesa frees its memory only when the driver is unloaded, or never. The
+/// leak sanitizer then reports only leaks of this project.
 void keep_driver_for_leak_sanitizer() {
   if (!kAddressSanitizer) return;
   const auto keep = [](dl_phdr_info* library, std::size_t, void*) {

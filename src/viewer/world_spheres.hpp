@@ -1,4 +1,4 @@
-/// The balls of a world that lies on a CUDA device, for pictures.
+/// The balls of a world on a CUDA device, for pictures.
 #pragma once
 
 #include <jfpx/world.hpp>

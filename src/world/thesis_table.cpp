@@ -1,4 +1,4 @@
-/// Choice between the engine's own functions and those of jfpx_thesis.
+/// Selection between built-in functions and those of jfpx_thesis.
 #include "src/world/thesis_table.hpp"
 
 #include <jfpx/error.hpp>
@@ -13,7 +13,7 @@ namespace {
 
 std::atomic<const ThesisTable*> enabled_table{nullptr};
 
-/// @param setting what requires the library
+/// @param setting name of the setting that requires the library
 const ThesisTable& require_thesis(const char* setting) {
   if (const ThesisTable* table = enabled_table.load(std::memory_order_acquire)) return *table;
   throw InvalidArgument(std::string(setting) +

@@ -1,4 +1,4 @@
-/// The functions that a World takes from the library jfpx_thesis.
+/// Table of the functions that the library jfpx_thesis provides to a World.
 #pragma once
 
 #include "src/world/contacts/broad_phase_search.hpp"
@@ -9,11 +9,11 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Makes the steps of one world with Solver::worst_first.
+/// Performs the steps of one world with Solver::worst_first.
 class WorstFirstStep {
  public:
   virtual ~WorstFirstStep() = default;
-  /// Runs all stages, as World::Impl::advance().
+  /// Runs all stages, like World::Impl::advance().
   virtual bool advance(WorldAccess::Impl* world, StepReport* report) = 0;
 };
 

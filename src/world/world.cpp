@@ -28,7 +28,7 @@ std::string no_memory_for(const char* what, std::size_t bodies) {
          " bodies: about " + std::to_string(bodies * kBytesPerBody) + " bytes are needed";
 }
 
-/// As *copy = array, on all threads.
+/// Parallel version of *copy = array.
 template <class Item>
 void copy_array(ThreadPool* pool, const std::vector<Item>& array, std::vector<Item>* copy) {
   resize_geometric(copy, array.size());
@@ -39,14 +39,14 @@ void copy_array(ThreadPool* pool, const std::vector<Item>& array, std::vector<It
 
 }  // namespace
 
-/// Whether no body has run away. @param runaway the first one that has
+/// Whether all bodies are in the world. @param runaway the first body that is not
 bool World::Impl::all_finite(const std::optional<BodyId>& runaway, StepReport* report) {
   report->non_finite = runaway.has_value();
   if (runaway) report->non_finite_body = *runaway;
   return !runaway;
 }
 
-/// Prepares for the contacts of a step: those of the last one become those of the step before.
+/// Prepares contact detection: the last contacts become those of the step before.
 void World::Impl::start_detection() {
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
@@ -58,7 +58,7 @@ void World::Impl::finish_detection(StepReport* report) {
   report->device_failure = contact_finder.collider().device_failure();
 }
 
-/// Detection of Solver::soft_step. The list of contacts is made only if generators may read it.
+/// Detection of Solver::soft_step. Builds the list of contacts only if there are generators.
 void World::Impl::find_contacts(StepReport* report) {
   soft_step::ContactSet& set = soft_step.contacts();
   DetectedContacts& found = contacts.detected;
@@ -76,7 +76,7 @@ void World::Impl::find_contacts(StepReport* report) {
   found.generated.assign(generated.begin(), generated.end());
 }
 
-/// The contact generators append to the list of contacts.
+/// Calls the contact generators, which append to the list of contacts.
 void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report) {
   const std::size_t count = list->size();
   ContactContext context(store, time(), list);
@@ -84,7 +84,7 @@ void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report
   report->generated_contacts = list->size() - count;
 }
 
-/// Number of movable bodies awake.
+/// Number of awake movable bodies.
 std::uint32_t World::Impl::count_awake() const {
   const std::span<const std::uint32_t> bodies = store.mobile();
   return parallel_reduce(
@@ -100,7 +100,7 @@ std::uint32_t World::Impl::count_awake() const {
 }
 
 /// Runs all stages of a step. Returns false, with the body in the report, if a state is no longer
-/// finite or within kMaxCoordinate; the caller then calls undo(), as after an exception.
+/// finite or exceeds kMaxCoordinate. The caller then calls undo(), as after an exception.
 bool World::Impl::advance(StepReport* report) {
   if (steps_on_device && advance_on_device(report)) return !report->non_finite;
   if (resident()) leave_device();
@@ -111,7 +111,7 @@ bool World::Impl::advance(StepReport* report) {
   return completed;
 }
 
-/// Detection, then integration and contacts in substeps. Until commit(), only arrays that
+/// Detection, then substeps of integration and contact solving. Until commit(), only arrays that
 /// save_for_undo() copies change.
 bool World::Impl::advance_soft_step(StepReport* report) {
   Stopwatch watch;
@@ -135,9 +135,9 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   return true;
 }
 
-/// Copies the arrays that a step changes before it can fail; of soft_step, forces and torques only
-/// if there are functions that add to them. Copying all arrays would take longer than some stages
-/// of a step on many threads.
+/// Copies the arrays that a step changes before it can fail. For soft_step, copies forces and
+/// torques only if there are callbacks that add to them. Copying all arrays would take longer than
+/// some stages of a step on many threads.
 void World::Impl::save_for_undo() {
   const MotionArrays& now = bodies().moving;
   is_saved = true;
@@ -181,8 +181,8 @@ void World::Impl::undo() noexcept {
   spent_us = 0;
 }
 
-/// Counts the steps at the end of which all bodies sleep. A report with a failure is not kept: the
-/// copy of its text may throw.
+/// Counts consecutive steps at whose end all bodies sleep. A report with a failure is not stored,
+/// because copying its text may throw.
 void World::Impl::note_rest(const StepReport& report) {
   const bool rests = scene.solver == Solver::soft_step && !report.non_finite && report.awake == 0 &&
                      report.device_failure.empty() && !store.has_moving_kinematic_body();

@@ -52,18 +52,17 @@ struct World::Impl {
     }
   }
 
-  /// Steps of graphs may be in progress, which use the memory of the device.
+  /// Drops the queue: steps of graphs may be in progress and use the memory of the device.
   ~Impl() { drop_queue(); }
 
-  /// The bodies for reading their motion, which it fetches from the device if it is newer there.
-  /// `store` alone serves for ids and properties. Const functions of a World may call it
-  /// concurrently.
+  /// The bodies for reading their motion. Fetches the motion if it is newer on the device. For ids
+  /// and properties, `store` is sufficient. Const functions of a World may call it concurrently.
   const BodyStore& bodies() {
     finish();
     if (resident()) fetch_motion();
     return store;
   }
-  /// The bodies for reading what BodyState has, likewise: a copy of less than half as much.
+  /// The bodies for reading the columns of BodyState; copies less than half as much as bodies().
   const BodyStore& bodies_with_states() {
     finish();
     if (resident()) fetch_states();
@@ -76,15 +75,16 @@ struct World::Impl {
     if (resident()) leave_device();
     return store;
   }
-  /// Adds a body, on the device, too, if that has the state of the world.
+  /// Adds a body, also on the device if the device has the state.
   BodyId add(const BodyDef& def);
-  /// Removes a body, likewise. Wakes the bodies in contact with it.
+  /// Removes a body, also on the device. Wakes the bodies in contact with it.
   void remove(BodyId id);
-  /// The bodies for an edit of one of them. While the world is on a device, the motion of the
-  /// others may be older than that on the device, and the next step edits the body there, too.
+  /// The bodies for an edit of one of them. While the device has the state, the motion of other
+  /// bodies may be outdated, and the next step applies the edit on the device, too.
   BodyStore& edited_body(std::uint32_t body, const BodyEdit& edit);
-  /// The same for a change of what contact lists show, or of a body whose neighbors must wake. On
-  /// the host it makes the lists, so that waking the neighbors cannot fail after the change.
+  /// edited_body() for a change that contact lists report, or of a body whose neighbors must wake.
+  /// On the host it builds the lists first, so that waking the neighbors cannot fail after the
+  /// change.
   BodyStore& edited_body_in_lists(std::uint32_t body, const BodyEdit& edit);
   void remember_listed(std::uint32_t body);
   JointId add_joint(const Joint& joint);
@@ -95,11 +95,11 @@ struct World::Impl {
   void complete_joint_edit(const JoinedBodies& joined);
   template <class F>
   void for_each_joined(const JoinedBodies& joined, const F& f);
-  /// Fetches what the joints keep. Const functions may call it concurrently.
+  /// Fetches impulses and colors of the joints. Const functions may call it concurrently.
   void fetch_joints();
-  /// Sends changed joints to the device.
+  /// Copies changed joints to the device.
   void flush_joints();
-  /// What every edit begins with.
+  /// Common start of all edits.
   void begin_edit() {
     finish();
     hold_graphs();
@@ -107,43 +107,43 @@ struct World::Impl {
   }
   /// [m], of the centre of mass
   Vec3 position(std::uint32_t body);
-  /// Makes a step on a device, so that its kernels are loaded. upload() must follow.
+  /// Performs a step on a device, which loads its kernels. upload() must follow.
   /// @param device of a Scene{} @throws DeviceError, OutOfMemory
   static std::unique_ptr<DeviceWorld> warmed(std::unique_ptr<DeviceWorld> device);
   /// Uploads the world, unless the device has its state.
   void enter_device();
-  /// Makes the recorded edits on the device.
+  /// Applies the pending edits on the device.
   void flush_edits();
-  /// Records that all bodies may have forces for the next step on the host.
+  /// Records that all bodies may have pending forces on the host.
   void note_forces();
   void fetch_motion();
   void fetch_states();
-  /// The contacts of the last step that was not undone, and those of the step before, made on
-  /// demand; a resident world fetches what they are made from.
-  /// Const functions may call them concurrently. @throws std::bad_alloc, DeviceError
+  /// The contacts of the last step, and of the step before, built on demand. If the device has the
+  /// state, fetches the data first. Const functions may call it concurrently.
+  /// @throws std::bad_alloc, DeviceError
   const ContactList& contact_list();
   const ContactList& contact_list_before();
-  /// Makes both lists, before a change of bodies, or a move to or from the device, that would
-  /// change what they are made from.
+  /// Builds the contact lists of the last two steps. Called before a change of bodies, or a move of
+  /// the state to or from the device, that would change their data.
   void make_contact_lists();
   void make_list(bool of_step_before, ContactList* list);
   /// Whether the device has the state of the world.
   bool resident() const noexcept { return mirror.is_resident(); }
-  /// Fetches everything, so that the host has the state of the world.
+  /// Moves the state of the world to the host.
   void leave_device();
-  /// As leave_device(), but the device keeps the state, too. Const functions may call it
+  /// leave_device(), except that the device keeps the state. Const functions may call it
   /// concurrently.
   void fetch_all();
   void fetch_contact_set();
 
   // Steps that do not wait for the host (world_queue.cpp).
 
-  /// cuda::enqueue_steps(), while the stream is not being captured, and while it is.
+  /// cuda::enqueue_steps() outside and inside stream capture.
   void enqueue(std::uint32_t count, cuda::Stream stream);
   void capture(std::uint32_t count, cuda::Stream stream);
-  /// Waits for the enqueued and replayed steps, and makes those that the device could not complete.
-  /// Everything that reads or changes the state calls it first. Const functions may call it
-  /// concurrently.
+  /// Waits for the enqueued and replayed steps, and performs the steps that the device could not
+  /// complete. Every function that reads or changes the state calls it first. Const functions may
+  /// call it concurrently.
   void finish() {
     if (queue.state.load(std::memory_order_acquire) != StepQueue::State::empty) finish_queue();
   }
@@ -158,18 +158,18 @@ struct World::Impl {
   void launch(cuda::Stream stream);
   void keep_report(StepReport report);
   /// Disables captured graphs before the host records a change. Steps of graphs are deferred until
-  /// the host has sent the change.
+  /// the change is copied to the device.
   void hold_graphs();
   /// Whether a graph may be launched at any time.
   bool has_graph() const { return resident() && device->has_graph(); }
-  /// Whether the host has changes for the next step that the device does not have yet.
+  /// Whether changes of the host for the next step are pending.
   bool has_changes() const {
     return !resident() || !mirror.edits.empty() ||
            mirror.joints == HostMirror::Joints::newer_on_host || device->is_held();
   }
-  /// Sends them, so that graphs can be captured and replayed.
+  /// Copies pending changes, so that graphs can be captured and replayed.
   void send_changes();
-  /// Forgets the queue, before the state is replaced.
+  /// Discards the queue before the state is replaced.
   void drop_queue() noexcept;
 
   /// A copy of a scene without bodies, ignored pairs and joints.
@@ -224,8 +224,8 @@ struct World::Impl {
 
   double time() const { return static_cast<double>(steps) * static_cast<double>(scene.dt); }
 
-  /// Whether the next step would change nothing: all bodies have slept during all of the last step,
-  /// whose contacts are therefore those of the next one, and nothing has changed since.
+  /// Whether the next step would change nothing: all bodies have slept during the whole last step,
+  /// whose contacts are therefore still valid, and nothing has changed since.
   bool is_at_rest() const {
     return steps_at_rest >= 2 && forces.ids().empty() && generators.ids().empty();
   }
@@ -253,10 +253,10 @@ struct World::Impl {
   void write(BinaryWriter* writer);
   void read(BinaryReader* reader);
 
-  std::unique_ptr<ThreadPool> pool;  ///< of the collider, if make_sphere_collider() made it, too
+  std::unique_ptr<ThreadPool> pool;  ///< may be shared with the collider
   Scene scene;                       ///< the settings, without bodies, pairs and joints
-  BodyStore store;                   ///< `mirror` says whether the motion is that on a device
-  JointStore joints;                 ///< likewise for what they keep
+  BodyStore store;                   ///< the motion may be outdated: see `mirror`
+  JointStore joints;                 ///< impulses and colors may be outdated: see `mirror`
   ContactFinder contact_finder;
   SoftStep soft_step;                           ///< of Solver::soft_step
   std::unique_ptr<WorstFirstStep> worst_first;  ///< of Solver::worst_first; otherwise null
@@ -266,22 +266,22 @@ struct World::Impl {
   Lazy<QueryTree> query_tree;  ///< of the bodies, built by the first query after a change
   StepContacts contacts{pool.get()};
   MotionArrays before;    ///< state that an undone step restores
-  bool is_saved = false;  ///< whether `before` is that of the current step
+  bool is_saved = false;  ///< whether `before` belongs to the current step
   std::uint64_t steps = 0;
-  /// Number of steps, up to the last one, after which no body was awake, without a change since.
+  /// Number of consecutive last steps without changes after which no body was awake.
   std::uint32_t steps_at_rest = 0;
   StepReport last_report;  ///< of the last of these steps
 
-  std::unique_ptr<DeviceWorld> device;  ///< null: the world is not stepped on a device
-  std::string device_failure;           ///< why there is no `device` any more; empty: no failure
+  std::unique_ptr<DeviceWorld> device;  ///< null: steps run on the CPU
+  std::string device_failure;           ///< why `device` was dropped; empty: no failure
   ForceTable force_table;               ///< of `forces`, for the device
   HostMirror mirror;
-  bool steps_on_device = false;                ///< whether the device makes the step in progress
+  bool steps_on_device = false;                ///< whether the step in progress runs on the device
   std::unique_ptr<AutomaticDevice> automatic;  ///< of Backend::automatic; null: a fixed backend
   /// [us] Duration of the last step and of the copies between host and device since, for
   /// `automatic`; 0: unknown.
   double spent_us = 0;
-  std::mutex fetching;  ///< held by functions that fetch, because const functions may call them
+  std::mutex fetching;  ///< held while fetching, because const functions may fetch concurrently
   StepQueue queue;
 };
 

@@ -35,7 +35,7 @@ void World::Impl::for_each_joined(const JoinedBodies& joined, const F& f) {
   if (joined.b != soft_step::kWorld) f(joined.b);
 }
 
-/// Prepares a change of joints of two bodies, which then cannot fail.
+/// Prepares a change of joints of two bodies, so that the change cannot fail.
 void World::Impl::begin_joint_edit(const JoinedBodies& joined) {
   begin_edit();
   fetch_joints();
@@ -88,7 +88,7 @@ void World::Impl::set_joint(std::uint32_t joint, const Joint& value) {
   complete_joint_edit({a, b, excludes});
 }
 
-/// Removes the joints of a body that is about to be removed, and wakes the bodies joined with it.
+/// Removes the joints of a body before its removal, and wakes the bodies joined with it.
 void World::Impl::remove_joints_of(std::uint32_t body) {
   bool any = false;
   joints.for_each_of(body, [&](std::uint32_t joint) {

@@ -15,7 +15,7 @@ namespace {
 
 using Motion = HostMirror::Motion;
 
-/// Adds the duration of a scope to `us`, also if an exception leaves the scope.
+/// Adds the duration of a scope to `us`, also when an exception leaves the scope.
 class ScopedTimer {
  public:
   explicit ScopedTimer(double* us) : us_(us) {}
@@ -42,7 +42,7 @@ std::unique_ptr<DeviceWorld> World::Impl::warmed(std::unique_ptr<DeviceWorld> de
   return std::move(world.impl_->device);
 }
 
-/// Selects the backend of the next step, with Backend::automatic for each step anew.
+/// Selects the backend of the next step. Backend::automatic selects anew for each step.
 void World::Impl::choose_device(StepReport* report) {
   steps_on_device = false;
   const double last_us = std::exchange(spent_us, 0);
@@ -67,7 +67,7 @@ void World::Impl::enter_device() {
   if (bodies_changed) contact_finder.set_bodies(store);
   bodies_changed = false;
   force_table.invalidate();
-  store.make_inertia_arrays();  // the device adds and edits bodies of any kind
+  store.make_inertia_arrays();  // bodies of any kind may be added and edited on the device
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
   mirror.enter();
   device->upload_joints(&joints);
@@ -84,7 +84,7 @@ BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {
   all.wakes |= edit.wakes;
   all.wakes_neighbors |= edit.wakes_neighbors;
   if (edit.wakes_neighbors) mirror.invalidate_other_motion();
-  if (edit.sets_mass) {  // the device has the orientation, and computes the inertia in world axes
+  if (edit.sets_mass) {  // the device computes the inertia in world axes
     mirror.invalidate_other_motion();
     force_table.invalidate();
   }
@@ -112,7 +112,7 @@ BodyId World::Impl::add(const BodyDef& def) {
   const std::uint32_t body = store.next_index();
   if (resident() && !device->has_room(std::size_t{body} + 1)) leave_device();
   if (!resident()) return store.add(def);
-  // Everything that may throw, before the store changes.
+  // All operations that may throw precede the change of the store.
   BodyEdits& edits = mirror.edits;
   BodyEdits added{{body, {.is_added = true}}};
   if (edits.size() + 1 >= edits.bucket_count()) edits.reserve(2 * edits.size() + 16);
@@ -134,7 +134,7 @@ void World::Impl::remove(BodyId id) {
     soft_step.forget(body);
     return;
   }
-  // Everything that may throw, before the store changes.
+  // All operations that may throw precede the change of the store.
   soft_step.reserve(store.capacity());
   remember_listed(body);
   mirror.edits[body];
@@ -179,7 +179,7 @@ void World::Impl::fetch_motion() {
   if (mirror.motion == Motion::all) return;
   flush_edits();
   const ScopedTimer timer(&spent_us);
-  // Other threads may be reading states that are current.
+  // Current states are not overwritten, because other threads may be reading them.
   if (mirror.motion == Motion::stale) device->fetch_states(&store.moving, pool.get());
   device->fetch_other_motion(&store.moving, pool.get());
   mirror.motion = Motion::all;
@@ -249,9 +249,9 @@ void World::Impl::leave_device() {
   mirror.leave();
 }
 
-/// One step on the device. If it fails, the CPU continues: the state is fetched, and later steps do
-/// not use the device.
-/// @returns false if the step is to be done on the host
+/// Performs one step on the device. If the device fails, fetches the state and performs all later
+/// steps on the CPU.
+/// @returns false if the host must perform the step
 bool World::Impl::advance_on_device(StepReport* report) {
   try {
     if (step_on_device(report)) return true;
@@ -269,7 +269,7 @@ bool World::Impl::advance_on_device(StepReport* report) {
   return false;
 }
 
-/// The host calls the forces, and the device gets their sums.
+/// Calls the forces on the host and copies their sums to the device.
 void World::Impl::apply_forces_on_host() {
   fetch_motion();
   save_for_undo();
@@ -279,7 +279,7 @@ void World::Impl::apply_forces_on_host() {
   note_forces();
 }
 
-/// @returns false if the step is to be done on the host, which reports what is wrong
+/// @returns false if the host must perform the step and report the error
 bool World::Impl::step_on_device(StepReport* report) {
   enter_device();
   flush_edits();
@@ -306,7 +306,7 @@ bool World::Impl::step_on_device(StepReport* report) {
   return true;
 }
 
-/// The device has completed steps: the host has nothing of the last one yet.
+/// Records completed steps of the device, and marks the host's copies as outdated.
 void World::Impl::complete_on_device(std::uint64_t count) {
   for (const std::uint32_t body : mirror.forced_bodies) {
     store.moving.force[body] = store.moving.torque[body] = {};
@@ -326,7 +326,7 @@ void World::Impl::fill_report(const DeviceWorld::Result& result, StepReport* rep
   report->awake = result.awake;
 }
 
-/// The CPU makes all later steps.
+/// Performs all later steps on the CPU.
 void World::Impl::lose_device(const std::string& failure) {
   device_failure = failure;
   device.reset();

@@ -55,7 +55,7 @@ detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
   }
 }
 
-/// The first entry into a body; of parts at the same distance, that of the first part.
+/// The first entry of a ray into a body. Among parts at the same distance, the first part is hit.
 detail::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
   detail::RayEntry first;
   for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
@@ -82,7 +82,7 @@ bool before(const RayHit& a, const RayHit& b) {
 
 bool accepts(const BodyFilter& filter, BodyId body) { return !filter || filter(body); }
 
-/// Whether a solid touches a shape. @param solid as find_contact() takes it
+/// Whether a solid touches a shape. @param solid in the form that find_contact() accepts
 template <class Instance, class S>
 bool touch(const Instance& solid, const Vec3& centre, const S& shape, const Transform& pose) {
   const detail::PairMotion at_rest{{}, 0, 0, {}, {}};

@@ -1,8 +1,8 @@
-/// Steps of a World on a device that do not wait for the host.
+/// Enqueued steps of a World on a device.
 ///
-/// The device counts the steps that it has completed. A step that it cannot complete, because a
-/// list is too short, a body runs away or a force must wake a body, and all steps after it, have no
-/// effect. The host makes these steps, one by one, when it needs the state.
+/// The device counts completed steps. A step cannot be completed if a list is too short, a body
+/// leaves the world or a force must wake a body. This step and all later ones then have no effect.
+/// The host performs these steps, one by one, when it needs the state.
 #include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 
@@ -45,7 +45,7 @@ void World::Impl::enqueue(std::uint32_t count, cuda::Stream stream) {
   if (queue.deferred_steps > 0) finish();
 }
 
-/// Enqueues the deferred steps on the device, as far as it can make them without the host.
+/// Enqueues the deferred steps on the device, up to the first that needs the host.
 void World::Impl::launch(cuda::Stream stream) {
   if (device == nullptr || (!is_launched() && !has_graph() && is_at_rest())) return;
   device->wait_for(stream);
@@ -114,7 +114,7 @@ void World::Impl::finish_queue() {
   make_deferred_steps();
 }
 
-/// Waits for the device, and records what it has completed.
+/// Waits for the device, and records its completed steps.
 void World::Impl::finish_launched() {
   DeviceWorld::Finished done;
   try {
@@ -141,7 +141,7 @@ void World::Impl::finish_launched() {
   keep_report(std::move(report));
 }
 
-/// Keeps the first failure of a device, until finish_steps() has returned it.
+/// Keeps the first device failure until finish_steps() returns it.
 void World::Impl::keep_report(StepReport report) {
   if (report.device_failure.empty()) std::swap(report.device_failure, queue.report.device_failure);
   queue.report = std::move(report);
@@ -162,7 +162,7 @@ void World::Impl::drop_queue() noexcept {
   if (is_launched() || has_graph()) {
     try {
       device->finish();
-    } catch (...) {  // the state that the device has lost is about to be replaced
+    } catch (...) {  // the lost state of the device is about to be replaced
     }
   }
   if (is_launched()) queue.state.store(StepQueue::State::open, std::memory_order_release);

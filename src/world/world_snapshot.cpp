@@ -25,7 +25,7 @@ void World::Impl::write(BinaryWriter* writer) {
   if (joints.capacity() > 0) write_joints(writer, joints);
 }
 
-/// Reads and checks everything before it changes the world.
+/// Reads and validates all data before changing the world.
 void World::Impl::read(BinaryReader* reader) {
   auto settings = reader->get<Scene>();
   validate(settings);

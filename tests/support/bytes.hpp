@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 namespace test {
 
 /// Each draw consumes one or two bytes, so that a mutation of one byte changes one choice. After
-/// the last byte, a fixed sequence of pseudo-random numbers follows.
+/// the last byte, the numbers are a fixed pseudo-random sequence.
 class Bytes {
  public:
   explicit Bytes(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -38,7 +38,7 @@ class Bytes {
   std::uint64_t below(std::uint64_t n) { return (n <= 256 ? next_byte() : next()) % n; }
   bool chance(Real share) { return static_cast<Real>(next_byte()) < 256 * share; }
 
-  /// A number that is mostly in [low, high), and occasionally a valid or invalid edge case.
+  /// A number that is mostly in [low, high), occasionally a valid or invalid edge case.
   Real number(Real low, Real high) {
     using Limits = std::numeric_limits<Real>;
     constexpr std::array<Real, 24> kEdgeCases{

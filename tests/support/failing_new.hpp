@@ -17,8 +17,8 @@ enum class Shortage {
   permanent  ///< that allocation and all later ones
 };
 
-/// During its lifetime, the k-th call of operator new fails, and with Shortage::permanent all later
-/// calls too. Requires that the program links failing_new.cpp. At most one object may exist.
+/// During its lifetime, the k-th call of operator new fails; with Shortage::permanent, all later
+/// calls also fail. Requires that the program links failing_new.cpp. At most one object may exist.
 class FailingNew {
  public:
   FailingNew(std::size_t k, Shortage shortage);
@@ -32,13 +32,13 @@ class FailingNew {
 /// Number of allocations that have not been freed.
 std::size_t live_allocations();
 
-/// For both shortages, calls `attempt(k, shortage)` for k = 0, 1, ... as long as it returns true,
-/// which must mean that an allocation failed.
+/// For both shortages, calls `attempt(k, shortage)` for k = 0, 1, ... until it returns false. It
+/// must return whether an allocation failed.
 /// @return number of calls that returned true
 std::size_t with_every_failure(
     const std::function<bool(std::size_t k, Shortage shortage)>& attempt);
 
-/// Makes the call with a failing k-th allocation.
+/// Executes the call with a failing k-th allocation.
 /// @return whether the call threw OutOfMemory or std::bad_alloc
 template <class Call>
 bool runs_out(std::size_t k, Shortage shortage, Call call) {

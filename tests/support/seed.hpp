@@ -15,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// A random seed, or the value of JFPX_TEST_SEED. Must exist as long as the test that uses it.
+/// A random seed, or the value of JFPX_TEST_SEED. Must exist until the end of the test.
 class Seed {
  public:
   Seed() {

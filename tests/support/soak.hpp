@@ -38,8 +38,8 @@ inline std::size_t resident_bytes() {
 }
 
 /// Calls step(n) for n = 0, 1, ..., `steps` - 1, and expects that memory use does not grow in the
-/// second half, apart from buffers that grow when a step has more contacts than any before.
-/// @param worlds number of worlds, each with buffers of its own
+/// second half, except for buffers that grow when a step has more contacts than all before.
+/// @param worlds number of worlds, each with its own buffers
 template <class Step>
 void expect_flat_memory(std::uint64_t steps, Step step, std::size_t worlds = 1) {
   constexpr std::size_t kBuffers = 128 * 1024, kPages = 4 * 1024 * 1024;

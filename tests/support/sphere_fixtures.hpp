@@ -27,10 +27,10 @@ std::span<const SphereKind> sphere_kinds();
 /// Returns the kind with this name; the test fails if there is none.
 const SphereKind& sphere_kind(std::string_view name);
 
-/// Makes spheres of one radius with uniformly random centres and about `contacts` contacts per
+/// Creates spheres of one radius with uniformly random centres and about `contacts` contacts per
 /// sphere.
 std::vector<SphereInstance> make_gas(std::size_t n, Real radius, Real contacts, Random& random);
-/// Makes n^3 spheres of radius 1 on a cubic lattice, in scan order.
+/// Creates n^3 spheres of radius 1 on a cubic lattice, in scan order.
 std::vector<SphereInstance> make_lattice(std::size_t n, Real spacing);
 void shuffle(std::vector<SphereInstance>& spheres, Random& random);
 

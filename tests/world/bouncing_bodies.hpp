@@ -9,7 +9,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// A box of half-spaces.
+/// Walls of a box, as half-spaces.
 inline std::vector<BodyDef> walls(Real room) {
   std::vector<BodyDef> bodies;
   for (const Real side : {Real(1), Real(-1)}) {

@@ -1,4 +1,4 @@
-/// The devices on which tests of queues run: the host, and a GPU if there is one.
+/// The devices for tests of queues: the host, and a GPU if there is one.
 #pragma once
 
 #include <jfpx/backend.hpp>
@@ -34,8 +34,8 @@ struct DeviceKind {
   std::string name;
   bool is_cuda = false;
   std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;
-  /// Captures what `work` enqueues on a stream. @returns a function that launches the graph on the
-  /// default stream
+  /// Captures the work that `work` enqueues on a stream. @returns a function that launches the
+  /// graph on the default stream
   std::function<std::function<void()>(World*, const std::function<void(cuda::Stream)>& work)>
       capture;
 };
@@ -106,7 +106,7 @@ inline std::vector<DeviceKind> device_kinds() {
   return kinds;
 }
 
-/// [bytes], memory of the GPU in use, also by other processes; 0 on the host.
+/// [bytes], GPU memory in use, including other processes; 0 on the host.
 inline std::size_t device_bytes_in_use([[maybe_unused]] const DeviceKind& kind) {
   std::size_t free = 0, total = 0;
 #if JFPX_HAS_CUDA
@@ -116,7 +116,7 @@ inline std::size_t device_bytes_in_use([[maybe_unused]] const DeviceKind& kind) 
 }
 
 #if JFPX_HAS_CUDA
-/// A stream that a program has made itself, or the default stream; on the host, none.
+/// A stream that the program has created, or the default stream; no stream on the host.
 class StreamOfUser {
  public:
   explicit StreamOfUser(const DeviceKind& kind, bool is_default = false)

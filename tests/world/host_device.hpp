@@ -1,4 +1,5 @@
-/// A device on the host: the programs of a device step in one thread, for machines without a GPU.
+/// A device on the host, for machines without a GPU: runs the programs of a device step in one
+/// thread.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
@@ -17,7 +18,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Runs the items of a loop in an order that differs from loop to loop, as on a device.
+/// Runs the items of a loop in an order that differs between loops, as on a device.
 class HostTeam {
  public:
   void sync() const {}
@@ -42,7 +43,7 @@ class HostTeam {
   void in_one_block(const F& f) const {
     f(*this);
   }
-  /// Completes the items in another order than the one in which they depend on each other.
+  /// Completes the items in a different order than that of their dependencies.
   template <class Dataflow>
   void run_dataflow(std::uint32_t n, const Dataflow& dataflow) const {
     std::vector<typename Dataflow::Item> items(n);
@@ -106,7 +107,7 @@ class HostDevice {
     T* data() const { return const_cast<T*>(items_.data()); }
     std::size_t capacity() const { return items_.size(); }
     void reserve(std::size_t count) {
-      // Poisoned, because memory of a device is not initialized.
+      // Poisoned, because device memory is not initialized.
       if (count <= items_.size()) return;
       items_.assign(count, T{});
       std::fill_n(reinterpret_cast<unsigned char*>(items_.data()), count * sizeof(T),
@@ -174,10 +175,10 @@ class HostDevice {
   void mark(int) {}
   double elapsed_ms(int from, int to) const { return to - from; }
 
-  /// Starts this number of programs, fails once, and then starts programs again.
+  /// Runs this number of programs, fails once, and then runs programs again.
   void fail_after(int runs) { runs_left_ = runs; }
 
-  /// As a CUDA graph.
+  /// Equivalent of a CUDA graph.
   struct Graph {
     std::vector<std::function<void()>> work;
     void launch() const {

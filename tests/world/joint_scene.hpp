@@ -1,5 +1,5 @@
-/// A scene with joints of every use: rods, ropes and springs, at any points, with the world, fixed
-/// bodies and movable ones, and more at one body than there are colors.
+/// A scene with joints of all uses: rods, ropes and springs, at any points, with the world, fixed
+/// bodies and movable bodies. One body has more joints than there are colors.
 #pragma once
 
 #include <jfpx/random.hpp>
@@ -49,7 +49,7 @@ inline Scene joint_scene() {
   }
   const BodyId end = add(Box{{Real(0.2), 1, Real(0.5)}}, 0, {Real(3.4), 2, 0});
   join_planks(end, last, -plank, plank);
-  // Balls that fall on it, some of them in pairs with a rod or a spring.
+  // Balls that fall on the bridge, some of them in pairs with a rod or a spring.
   for (int i = 0; i < 30; ++i) {
     const BodyId ball =
         add(Sphere{Real(0.15)}, 1, random.uniform_in_box({-3, 3, Real(-0.3)}, {3, 6, Real(0.3)}));
@@ -63,7 +63,7 @@ inline Scene joint_scene() {
     joint.damping_ratio = Real(0.2);
     scene.joints.push_back(joint);
   }
-  // A heavy ball that hangs in the world, and carries many others on ropes.
+  // A heavy ball that hangs from the world and carries many balls on ropes.
   const BodyId hub = add(Sphere{Real(0.5)}, 30, {0, 9, 3});
   scene.joints.push_back(
       DistanceJoint{.a = hub, .anchor_b = {0, 11, 3}, .min_length = Real(0.5), .max_length = 2});

@@ -85,7 +85,7 @@ class LinearQueries {
     }
   }
 
-  /// Scaled by a power of two before the normalization, as in a World.
+  /// Scales by a power of two before the normalization, as in a World.
   static Vec3 unit_direction(const Vec3& v) {
     int exponent = 0;
     std::frexp(std::max({absolute(v.x), absolute(v.y), absolute(v.z)}), &exponent);

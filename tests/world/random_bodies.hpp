@@ -80,8 +80,8 @@ inline Joint random_joint(Random* random, BodyId a, std::optional<BodyId> b) {
   return joint;
 }
 
-/// Adds joints to a scene: some of any bodies, and some of one body, up to more than there are
-/// colors.
+/// Adds joints to a scene: some between random bodies, and some at one body, up to more than there
+/// are colors.
 inline void add_random_joints(Random* random, Scene* scene) {
   const std::uint64_t bodies = scene->bodies.size();
   const auto add = [&](std::uint64_t a, std::uint64_t b) {
@@ -97,7 +97,7 @@ inline void add_random_joints(Random* random, Scene* scene) {
   if (random->below(4) == 0) {
     const std::size_t first = scene->joints.size();
     for (int k = 0; k < 70; ++k) add(hub, random->below(bodies));
-    // So many springs would throw the bodies apart.
+    // This many springs would throw the bodies apart.
     for (Joint& joint : std::span(scene->joints).subspan(first)) {
       std::get<DistanceJoint>(joint).hertz = 0;
     }

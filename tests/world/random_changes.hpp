@@ -29,7 +29,7 @@ inline Scene random_room(Random* random) {
   return scene;
 }
 
-/// A change that both worlds get.
+/// A change that is applied to both worlds.
 class Change {
  public:
   Change(Random* random, double time)

@@ -28,7 +28,7 @@ inline constexpr double kEps = static_cast<double>(kEpsilon);
 inline constexpr double kPiD = 3.14159265358979323846;
 inline constexpr double kG = 9.81;  ///< [m/s^2]
 
-/// A seed that differs in every run, or that of JFPX_TEST_SEED. Report it with SCOPED_TRACE.
+/// A fresh seed, or that of JFPX_TEST_SEED. Report it with SCOPED_TRACE.
 inline std::uint64_t fresh_seed() {
   if (const char* fixed = std::getenv("JFPX_TEST_SEED")) return std::strtoull(fixed, nullptr, 0);
   std::random_device device;
@@ -45,7 +45,7 @@ inline Scene thesis_scene() {
 
 inline constexpr Solver kSolvers[] = {Solver::soft_step, Solver::worst_first};
 
-/// Fixture of tests that hold with every solver, or with any.
+/// Fixture of tests that hold for every solver, or for any.
 using SolverTest = testing::TestWithParam<Solver>;
 /// An empty scene for the solver of a SolverTest.
 inline Scene empty_scene() {
@@ -64,11 +64,11 @@ inline std::string solver_name(const testing::TestParamInfo<Solver>& info) {
 #define JFPX_INSTANTIATE_SOLVERS(Suite)                                               \
   INSTANTIATE_TEST_SUITE_P(Solvers, Suite, testing::ValuesIn(::jfpx::test::kSolvers), \
                            ::jfpx::test::solver_name)
-/// Defines a suite of tests of what each solver does in its own way.
+/// Defines a suite of tests of solver-specific behaviour.
 #define JFPX_SOLVER_SUITE(Suite)                    \
   class Suite : public ::jfpx::test::SolverTest {}; \
   JFPX_INSTANTIATE_SOLVERS(Suite)
-/// The same for tests of what does not depend on the solver, with Solver::soft_step alone.
+/// Defines a suite of solver-independent tests, run with Solver::soft_step only.
 #define JFPX_INSTANTIATE_SOFT_STEP(Suite)                                              \
   INSTANTIATE_TEST_SUITE_P(Solvers, Suite, testing::Values(::jfpx::Solver::soft_step), \
                            ::jfpx::test::solver_name)
@@ -113,8 +113,8 @@ inline Scene on_the_ground(std::vector<BodyDef> bodies) {
 }
 
 /// Expects that a stack of ten bodies like the lowest moves less than a millimetre in ten seconds.
-/// With soft contacts it first sinks until the overlaps carry the weight, by three centimetres at
-/// most.
+/// With soft contacts, it first sinks by at most three centimetres, until the overlaps carry the
+/// weight.
 inline void expect_that_ten_stand(const BodyDef& lowest, Real height) {
   Scene scene = empty_scene();
   for (int i = 0; i < 10; ++i) {

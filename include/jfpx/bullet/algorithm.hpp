@@ -26,8 +26,8 @@ namespace bullet {
 /// Thread safety is that of Bullet's algorithms.
 class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorithm {
  public:
-  /// Gets a new manifold from the dispatcher, as Bullet's create function makes Bullet's algorithm
-  /// do. If the manifold pool is exhausted, the algorithm does nothing.
+  /// Gets a new manifold from the dispatcher, as the constructor of Bullet's algorithm does for its
+  /// create function. If the manifold pool is exhausted, the algorithm has no effect.
   SphereSphereAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
                         const btCollisionObjectWrapper* body0,
                         const btCollisionObjectWrapper* body1);

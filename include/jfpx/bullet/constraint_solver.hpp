@@ -24,8 +24,8 @@ struct ConstraintSolverOptions {
   int device = 0;                         ///< cuda: ordinal of the GPU
   unsigned threads = 1;                   ///< at most 256; 0: one per core
   SimdLevel simd = SimdLevel::automatic;  ///< vector instructions for rows: AVX2 or none
-  /// Groups with fewer manifolds are solved by Bullet's own code, for every backend. So are groups
-  /// with little parallelism where that has measured faster, except with 0 or with Backend::cuda.
+  /// Bullet's own code solves groups with fewer manifolds, for every backend. It also solves groups
+  /// with little parallelism if it has measured faster, except with 0 or with Backend::cuda.
   std::size_t minimum_batch = 24;
 };
 
@@ -54,7 +54,7 @@ struct ConstraintSolverStats {
   std::uint64_t joints = 0;     ///< constraints in the groups solved by jfpx
   std::uint64_t sweeps = 0;     ///< sweeps over the rows of these groups
   std::array<std::uint64_t, kSolverFallbacks> fallbacks{};  ///< groups, by SolverFallback
-  /// Why the GPU is no longer used and the CPU replaces it; empty if the GPU has not failed.
+  /// Why the CPU permanently replaces the GPU; empty if the GPU has not failed.
   std::string device_failure;
 };
 

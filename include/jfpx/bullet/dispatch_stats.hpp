@@ -29,7 +29,7 @@ inline constexpr std::size_t kFallbackCount = 8;
 JFPX_API std::string_view to_string(Fallback fallback) noexcept;
 
 /// Reason why a batch updated the manifolds in Bullet's order on one thread, which is slower. The
-/// bits are identical either way. The first that applies is counted.
+/// bits are identical either way. The first reason that applies is counted.
 enum class OrderReason : std::uint8_t {
   none,                ///< any order, on all threads
   combine_callback,    ///< the user combines materials; Bullet computes all contacts

@@ -25,12 +25,11 @@ struct DispatcherOptions {
   bool verify = false;  ///< see set_verify()
 };
 
-/// A btCollisionDispatcher that computes the pairs of a dispatch in one batch: it tests all pairs
-/// of two spheres on the CPU or a GPU; and unless a callback or an overridden filter can observe
-/// the order of the pairs, it also computes pairs of a sphere with a btBoxShape or
-/// btStaticPlaneShape, and runs Bullet's algorithms of the other pairs of boxes, capsules,
-/// cylinders, cones, spheres and planes on all threads. Bullet computes the pairs of all other
-/// shapes.
+/// A btCollisionDispatcher that computes the pairs of a dispatch in one batch. It tests all pairs
+/// of two spheres on the CPU or a GPU. Unless a callback or an overridden filter can observe the
+/// order of the pairs, it also computes pairs of a sphere with a btBoxShape or btStaticPlaneShape,
+/// and runs Bullet's algorithms for the other pairs of boxes, capsules, cylinders, cones, spheres
+/// and planes on all threads. Bullet computes the pairs of all other shapes.
 ///
 /// Manifolds, their order, every field of every point, callbacks, and therefore trajectories are
 /// those of btCollisionDispatcher, bit for bit. No create function is registered: the pairs keep

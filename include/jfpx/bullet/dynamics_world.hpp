@@ -25,12 +25,11 @@ struct DynamicsWorldOptions {
 /// states are called by the thread that steps the world.
 ///
 /// In steps with continuous collision of any body, bodies are integrated one at a time, because the
-/// sweep of each body depends on the new positions of the bodies before it. All overrides and calls
-/// of the user work as in Bullet, with one exception: while islands are split,
-/// buildAndProcessIslands() of Bullet's own island manager and the world's protected
-/// m_solverIslandCallback are not used. An island manager of another class builds the islands
-/// itself. Where user code may run during the update of the AABBs, and might change the world,
-/// Bullet updates them.
+/// sweep of each body depends on the new positions of earlier bodies. All overrides and callbacks
+/// work as in Bullet, with one exception: while islands are split, buildAndProcessIslands() of
+/// Bullet's own island manager and the world's protected m_solverIslandCallback are not used. An
+/// island manager of another class builds the islands itself. If user code that may change the
+/// world can run during the update of the AABBs, Bullet's own code updates them.
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
 /// As in Bullet, only one thread at a time may use a world; different worlds are independent.

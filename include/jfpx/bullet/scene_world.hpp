@@ -56,7 +56,7 @@ struct StageTimes {
 ///   where the scene's rule is the product and are square roots where it is the geometric mean;
 /// - acceleration: the gravity of the body; the gravity of the world is zero;
 /// - filters: the collision filter groups and masks of Bullet, if any filter is not the default. A
-///   kinematic body then also gets contact points with other bodies of mass 0, which have no
+///   kinematic body then also gets contact points with other bodies of mass 0; these points have no
 ///   effect;
 /// - sensor: CF_NO_CONTACT_RESPONSE;
 /// - ignored pairs: btCollisionObject::setIgnoreCollisionCheck();

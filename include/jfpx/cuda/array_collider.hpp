@@ -1,5 +1,5 @@
-/// Sphere collider for arrays in device memory, as other libraries have them: separate arrays of
-/// positions and radii go in, separate arrays of indices, normals and distances come out.
+/// Sphere collider for arrays in device memory in the layout of other libraries: separate arrays of
+/// positions and radii as input, separate arrays of indices, normals and distances as output.
 #pragma once
 
 #include <jfpx/cuda/sphere_collider.hpp>
@@ -24,7 +24,7 @@ struct SphereArrays {
   Real radius = 0;  ///< [m], > 0
 };
 
-/// What a search finds.
+/// Kind of the result of a search.
 enum class ArrayResult : std::uint8_t {
   pairs,    ///< indices alone
   contacts  ///< with normals and distances
@@ -50,52 +50,53 @@ class JFPX_API ArrayCollider {
   /// @throws InvalidArgument naming the first invalid sphere and field, OutOfMemory, DeviceError
   std::uint64_t find(const SphereArrays& spheres, ArrayResult result, bool both_orders,
                      Stream stream);
-  /// Finds the pairs of find(), without both orders, and writes the indices a to indices[0 .. E)
-  /// and the indices b to indices[E .. 2 * E), if their number E, which is returned, is at most
-  /// `capacity`. Waits for the number alone: the indices are written in the order of the stream.
-  /// Saves the memory of the result, which is not kept, and the time of write_pairs().
+  /// Finds the pairs of find(), without both orders, and returns their number E. If E is at most
+  /// `capacity`, writes the indices a to indices[0 .. E) and the indices b to indices[E .. 2 * E).
+  /// Waits only for the number: the indices are written in the order of the stream. The result is
+  /// not kept, which saves its memory and the time of write_pairs().
   /// @param indices room for 2 * capacity elements, in device memory
-  /// @throws as find()
+  /// @throws the exceptions of find()
   std::uint64_t find_pairs(const SphereArrays& spheres, std::int32_t* indices, std::size_t capacity,
                            Stream stream);
   std::uint64_t find_pairs(const SphereArrays& spheres, std::int64_t* indices, std::size_t capacity,
                            Stream stream);
-  /// Finds the touching pairs of a sphere of `first` and one of `second`, as
+  /// Finds the touching pairs of a sphere of `first` and one of `second`; see
   /// jfpx::find_contacts_between().
-  /// @throws as find()
+  /// @throws the exceptions of find()
   std::uint64_t find_between(const SphereArrays& first, const SphereArrays& second,
                              ArrayResult result, Stream stream);
-  /// Finds the contacts within each of many systems, as jfpx::find_contacts_in_systems(). Tests all
-  /// pairs of each system.
+  /// Finds the contacts within each of many systems; see jfpx::find_contacts_in_systems(). Tests
+  /// all pairs of each system.
   /// @param offsets in host memory
-  /// @throws as find(); InvalidArgument also for bad offsets
+  /// @throws the exceptions of find(); InvalidArgument also for invalid offsets
   std::uint64_t find_in_systems(const SphereArrays& spheres, std::span<const std::uint64_t> offsets,
                                 ArrayResult result, bool both_orders, Stream stream);
-  /// Finds the touching pairs in a periodic cell, as jfpx::find_periodic_contacts().
-  /// @throws InvalidArgument as that function; OutOfMemory, DeviceError
+  /// Finds the touching pairs in a periodic cell; see jfpx::find_periodic_contacts().
+  /// @throws InvalidArgument like that function; OutOfMemory, DeviceError
   std::uint64_t find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
                               ArrayResult result, bool both_orders, Stream stream);
-  /// The same within each of many systems, as jfpx::find_periodic_contacts_in_systems(). Tests all
-  /// pairs of each system.
+  /// Finds the touching pairs within each of many periodic systems; see
+  /// jfpx::find_periodic_contacts_in_systems(). Tests all pairs of each system.
   /// @param offsets, cells in host memory
-  /// @throws as find_periodic(); InvalidArgument also for bad offsets or another number of cells
+  /// @throws the exceptions of find_periodic(); InvalidArgument also for invalid offsets or another
+  ///   number of cells
   std::uint64_t find_periodic_in_systems(const SphereArrays& spheres,
                                          std::span<const std::uint64_t> offsets,
                                          std::span<const PeriodicCell> cells, ArrayResult result,
                                          bool both_orders, Stream stream);
-  /// The same between two sets, as jfpx::find_periodic_contacts_between().
-  /// @throws as find_periodic()
+  /// Finds the touching pairs between two sets; see jfpx::find_periodic_contacts_between().
+  /// @throws the exceptions of find_periodic()
   std::uint64_t find_periodic_between(const SphereArrays& first, const SphereArrays& second,
                                       const PeriodicCell& cell, ArrayResult result, Stream stream);
   /// Enqueues find() without both_orders. Neither allocates nor waits, so that the call and the
   /// writes below can be captured in a CUDA graph. If the number of contacts exceeds the
-  /// reservation, or a sphere is invalid, nothing is written but the count.
-  /// Captured work is valid until another call reserves more memory.
+  /// reservation, or a sphere is invalid, only the count is written. A captured graph is valid
+  /// until another call reserves more memory.
   /// @throws InvalidArgument for more spheres than are reserved, DeviceError
   void enqueue(const SphereArrays& spheres, ArrayResult result, Stream stream);
 
   /// Enqueue the output of the last search to device memory. Each array has room for `capacity`
-  /// contacts; if there are more, the first are written. @throws DeviceError, here and below
+  /// contacts; further contacts are dropped. @throws DeviceError, here and below
   void write_pairs(std::int32_t* a, std::int32_t* b, std::size_t capacity, Stream stream);
   void write_pairs(std::int64_t* a, std::int64_t* b, std::size_t capacity, Stream stream);
   /// @param normals 3 * capacity elements
@@ -107,7 +108,7 @@ class JFPX_API ArrayCollider {
   /// Writes the offsets of compressed rows, one more than the spheres of the (first) set. Must not
   /// follow enqueue().
   void write_offsets(std::int64_t* offsets, Stream stream);
-  /// Writes {number of contacts, 1 if they are complete or else 0}.
+  /// Writes {number of contacts, 1 if all of them were found and 0 otherwise}.
   void write_count(std::int64_t* count, Stream stream);
 
  private:

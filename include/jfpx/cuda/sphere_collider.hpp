@@ -27,8 +27,8 @@ struct ContactCount {
 };
 
 /// Finds contacts on the device, in the order of one stream. Only the constructor, reserve() and
-/// the destructor allocate or wait, so that all other calls can be captured in a CUDA graph.
-/// Captured work is valid until reserve() grows a buffer or the object is destroyed. Not
+/// the destructor allocate or wait, so that all other calls can be captured in a CUDA graph. A
+/// captured graph is valid until reserve() grows a buffer or the object is destroyed. Not
 /// thread-safe. Objects are independent of each other, also on the same device.
 class JFPX_API DeviceSphereCollider {
  public:

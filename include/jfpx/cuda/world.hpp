@@ -17,77 +17,77 @@ namespace cuda {
 /// consecutive Reals (x, y, z), a Quat four (w, x, y, z), without padding.
 ///
 /// The arrays must not be written. Steps change them in place; they are valid until `version`
-/// changes. They are complete when device_states() returns, so that kernels on any stream of the
-/// device can read them, unless enqueued or replayed steps are in progress: then only kernels that
-/// follow these steps on their stream can. The reads must be complete before the next step or
-/// change, or precede it on the stream that enqueue_steps() gets, or on `stream`.
+/// changes. When device_states() returns, the arrays are complete, and kernels on any stream of the
+/// device can read them. If enqueued or replayed steps are in progress, only kernels that follow
+/// these steps on their stream can read them. The reads must be complete before the next step or
+/// change, or precede it on `stream` or on the stream that is passed to enqueue_steps().
 struct DeviceStates {
   int device = 0;                   ///< ordinal of the GPU
   Stream stream = nullptr;          ///< all work of the world is enqueued on it, except graphs
   std::size_t slots = 0;            ///< length of the four arrays of states
   std::size_t count = 0;            ///< number of living bodies
-  const BodyId* ids = nullptr;      ///< of the living bodies, as World::bodies(): sorted by index
+  const BodyId* ids = nullptr;      ///< of the living bodies, sorted by index as in World::bodies()
   const Vec3* positions = nullptr;  ///< [m], centres of mass
   const Quat* orientations = nullptr;        ///< unit quaternions
   const Vec3* velocities = nullptr;          ///< [m/s]
   const Vec3* angular_velocities = nullptr;  ///< [rad/s], world axes
-  /// In device memory: number of enqueued and replayed steps that the device has deferred to the
-  /// host; see enqueue_steps(). The states are those before these steps.
+  /// In device memory: number of enqueued and replayed steps that were deferred to the host; see
+  /// enqueue_steps(). The states are those before the deferred steps.
   const std::uint64_t* deferred_steps = nullptr;
-  /// Changes when arrays move, and whenever a captured graph of steps becomes invalid: when bodies
-  /// come or go, when a list of contacts needs more memory, when the world moves to the host, when
-  /// add_force(), remove_force() or restore() is called, when masses change in a world with forces,
-  /// and when ignored pairs change or the first filter is set.
+  /// Changes when arrays are reallocated, and when captured graphs of steps become invalid: when
+  /// bodies are added or removed, a list of contacts needs more memory, the world moves to the
+  /// host, add_force(), remove_force() or restore() is called, masses change in a world with
+  /// forces, ignored pairs change, or the first filter is set.
   std::uint64_t version = 0;
 };
 static_assert(sizeof(Vec3) == 3 * sizeof(Real) && sizeof(Quat) == 4 * sizeof(Real));
 
-/// Returns the states after the last step and all changes since. Copies nothing if the device has
-/// them, as after a step there; otherwise sends the changes, or uploads the world. Waits for
-/// enqueued or replayed steps only if there are changes to send. Must not run concurrently with any
-/// call on the same world.
-/// @throws BackendUnavailable with the reason if the world has no device. A world has one with
-///   Solver::soft_step and Backend::cuda, or Backend::automatic after that has started the device,
-///   until it fails. DeviceError, OutOfMemory; the world is then unchanged.
+/// Returns the states after the last step and all later changes. Copies nothing if the states are
+/// on the device, as after a step there; otherwise copies the changes, or uploads the world. Waits
+/// for enqueued or replayed steps only if there are changes to copy. Must not run concurrently with
+/// any call on the same world.
+/// @throws BackendUnavailable with the reason if the world has no device. A world with
+///   Solver::soft_step has a device with Backend::cuda, or once Backend::automatic has started it,
+///   until the device fails. DeviceError, OutOfMemory; the world is then unchanged.
 JFPX_API DeviceStates device_states(World& world);
 
 /// Enqueues `count` steps on the device, after earlier work of `stream` and before its later work,
 /// and returns without waiting for them. Every function of World that reads or changes the state
-/// waits, as finish_steps() does; all results are those of World::step(), bit for bit.
+/// waits like finish_steps(). All results equal those of World::step(), bit for bit.
 ///
-/// The device defers a step to the host if a list of contacts is too short, if a body runs away, or
-/// if a force must wake a body. This step and those after it then have no effect on the device, and
-/// the host makes them when it waits. Kernels read the number of these steps from
+/// A step is deferred to the host if a list of contacts is too short, a body leaves the world, or a
+/// force must wake a body. This step and all later ones then have no effect on the device; the host
+/// performs them when it waits. Kernels read the number of deferred steps from
 /// DeviceStates::deferred_steps. Steps with user-defined forces or contact generators, and all
-/// steps of a sleeping world, are made before the call returns. If a CUDA call fails, the CPU makes
-/// the steps, and finish_steps() reports the reason.
+/// steps of a sleeping world, are performed before the call returns. If a CUDA call fails, the CPU
+/// performs the steps, and finish_steps() reports the reason.
 ///
 /// If `stream` is being captured, the steps become part of its CUDA graph, and each launch of the
-/// graph makes them. Graphs, enqueued steps and single steps may follow each other; after a change
-/// of the world, the steps of a graph are deferred until device_states(), step() or enqueue_steps()
-/// has sent the change. Requirements:
-///   - the world has made a step on the device since it moved there, there are no user-defined
+/// graph performs them. Graphs, enqueued steps and single steps may alternate. After a change of
+/// the world, the steps of a graph are deferred until device_states(), step() or enqueue_steps()
+/// has copied the change to the device. Requirements:
+///   - the world has performed a step on the device since it moved there, there are no user-defined
 ///     forces and contact generators, and device_states() has been called after the last change;
 ///   - a graph is launched only while DeviceStates::version is that of the capture, and not
-///     concurrently with another call on the world; the caller orders streams, if several launch
-///     graphs of the world, or enqueue steps;
+///     concurrently with another call on the world; the caller orders the streams if several
+///     streams launch graphs of the world or enqueue steps;
 ///   - after an exception, the captured graph is discarded;
 ///   - while a stream is being captured, no other function of the world is called.
-/// As long as a graph is valid, waiting for the steps of the world waits for the whole device.
+/// While a graph is valid, waiting for the steps of the world waits for the whole device.
 ///
 /// A reference from World::force() must not be used for a change while steps are in progress: call
 /// force() again, which waits. Must not run concurrently with any call on the same world.
 /// @param stream a cudaStream_t of the device of the world; null: the default stream
-/// @throws BackendUnavailable as device_states(); InvalidArgument if the stream is being captured
+/// @throws BackendUnavailable like device_states(); InvalidArgument if the stream is being captured
 ///   and a requirement is not met; OutOfMemory and the exceptions of World::step() if steps are
-///   made at once; DeviceError if a call fails while the stream is being captured
+///   performed at once; DeviceError if a call fails while the stream is being captured
 JFPX_API void enqueue_steps(World& world, std::uint32_t count, Stream stream);
 
-/// Waits for all enqueued steps, and for those of all graphs that have been launched, and makes the
+/// Waits for all enqueued steps and for the steps of all launched graphs, then performs the
 /// deferred steps.
 /// @returns the report of the last of these steps, without times of the stages; if there are none,
-///   that of the last earlier one. A failure of the device is reported once.
-/// @throws as World::step(); the steps that were not yet made are then left out
+///   the report of the last earlier step. A failure of the device is reported once.
+/// @throws the exceptions of World::step(); the remaining steps are then dropped
 JFPX_API StepReport finish_steps(World& world);
 
 }  // namespace cuda

@@ -1,7 +1,6 @@
-/// Conservative early-out tests that run before collide() (the intersection tester of thesis
-/// 4.4.5). If may_touch() returns false, collide() with the same arguments finds no contact,
-/// including in its rounding (errata E15, E15b, E57), because the margins are several times the
-/// rounding errors of both.
+/// Conservative early-out tests before collide() (the intersection tester of thesis 4.4.5). If
+/// may_touch() returns false, collide() with the same arguments finds no contact, including its
+/// rounding (errata E15, E15b, E57): the margins are several times the rounding errors of both.
 #pragma once
 
 #include <jfpx/collide.hpp>
@@ -9,14 +8,14 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// [m], bound of the rounding errors of heights and lengths of this size.
+/// [m], upper bound of the rounding errors of heights and lengths of this size.
 JFPX_HD constexpr Real rounding_margin(Real size) { return 32 * kEpsilon * size; }
 /// Sum of the absolute values of the coordinates.
 JFPX_HD inline Real largest_sum(const Vec3& v) {
   return absolute(v.x) + absolute(v.y) + absolute(v.z);
 }
 
-/// Equal to the test in collide(), which is no more expensive.
+/// Equals the test of collide(), which is no more expensive.
 JFPX_HD constexpr bool may_touch(const SphereInstance& sphere, const HalfSpace& half_space) {
   return (dot(half_space.normal, sphere.centre) - half_space.offset) - sphere.radius <= 0;
 }

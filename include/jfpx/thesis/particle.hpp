@@ -1,5 +1,5 @@
-/// Particles: point masses and small balls without orientation (thesis 3.7, after Millington). They
-/// serve the demos of the thesis; a World does not use them.
+/// Particles: point masses and small balls without orientation (thesis 3.7, after Millington). Used
+/// by the demos of the thesis; independent of World.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -83,7 +83,7 @@ class JFPX_API ParticleWorld {
 
   /// @throws InvalidArgument with the name of the bad field, its value and its range
   ParticleId add(const ParticleDef& particle);
-  /// @throws InvalidArgument, here and below, if the id is not of a living particle of this world
+  /// @throws InvalidArgument, here and below, for an id of no living particle of this world
   void remove(ParticleId id);
   /// Living particles in the order of their indices.
   std::span<const ParticleId> particles() const;

@@ -20,11 +20,10 @@ namespace cuda {
                                                   const char* what, const char* call,
                                                   const char* file, int line);
 
-/// Fault injection for tests. The next `calls` CUDA calls of this thread are made as usual; the one
-/// after them is not made and returns `error`. A negative number disables the injection.
+/// Fault injection for tests. The next `calls` CUDA calls of this thread are executed; the
+/// following call is not executed and returns `error`. A negative number disables the injection.
 JFPX_API void inject_fault(long calls, cudaError_t error);
-/// Counts a CUDA call, and returns the error that a test has injected for it, otherwise
-/// cudaSuccess.
+/// Counts a CUDA call. Returns the error that a test has injected for it, otherwise cudaSuccess.
 JFPX_API cudaError_t take_injected_fault() noexcept;
 
 }  // namespace cuda
@@ -41,7 +40,7 @@ JFPX_API cudaError_t take_injected_fault() noexcept;
     return result;                                                          \
   }()
 
-/// Makes a CUDA call. @throws DeviceError if it fails
+/// Executes a CUDA call. @throws DeviceError if it fails
 #define JFPX_CUDA_TRY(call)                                                    \
   do {                                                                         \
     const cudaError_t jfpx_error = JFPX_CUDA_RESULT(call);                     \
@@ -49,7 +48,7 @@ JFPX_API cudaError_t take_injected_fault() noexcept;
       ::jfpx::cuda::throw_device_error(jfpx_error, #call, __FILE__, __LINE__); \
   } while (false)
 
-/// As JFPX_CUDA_TRY, for a call that allocates `bytes` bytes for `what`.
+/// JFPX_CUDA_TRY for a call that allocates `bytes` bytes for `what`.
 #define JFPX_CUDA_TRY_ALLOC(call, bytes, what)                                                  \
   do {                                                                                          \
     const cudaError_t jfpx_error = JFPX_CUDA_RESULT(call);                                      \

@@ -138,7 +138,7 @@ class DeviceBuffer {
     return array_.reserve(
         count, [&](std::size_t bytes) { return DeviceMemory(pool, stream, bytes, what); });
   }
-  /// The same, but a reallocation adds slack, so that a slowly growing count rarely causes one.
+  /// reserve() with slack, so that a slowly growing count rarely causes a reallocation.
   bool reserve_geometric(const MemoryPool& pool, cudaStream_t stream, std::size_t count,
                          const char* what) {
     return array_.reserve_geometric(
@@ -157,11 +157,11 @@ class DeviceBuffer {
 template <typename T>
 class PinnedBuffer {
  public:
-  /// As DeviceBuffer::reserve().
+  /// See DeviceBuffer::reserve().
   bool reserve(std::size_t count, const char* what) {
     return array_.reserve(count, [&](std::size_t bytes) { return PinnedMemory(bytes, what); });
   }
-  /// As DeviceBuffer::reserve_geometric().
+  /// See DeviceBuffer::reserve_geometric().
   bool reserve_geometric(std::size_t count, const char* what) {
     return array_.reserve_geometric(count,
                                     [&](std::size_t bytes) { return PinnedMemory(bytes, what); });

@@ -1,4 +1,4 @@
-/// Queries about the device code of this build that the current device runs.
+/// Queries about the code of this build for the current device.
 #pragma once
 
 #include <jfpx/config.hpp>

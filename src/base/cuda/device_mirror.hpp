@@ -12,9 +12,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Compares each block of the array with a host copy of the values that were uploaded last. The
-/// comparison reads as many bytes as an upload would, but host memory is faster than the bus, and
-/// callers need not track changes.
+/// Compares each block of the array with a host copy of the last uploaded values. The comparison
+/// reads as many bytes as an upload would, but host memory is faster than the bus, and callers need
+/// not track changes.
 template <typename T>
 class DeviceMirror {
  public:
@@ -48,7 +48,7 @@ class DeviceMirror {
 
  private:
   static constexpr std::size_t kBlock = 4096 / sizeof(T);
-  /// Shorter gaps between changed blocks are uploaded too, because a separate copy takes longer.
+  /// Shorter gaps between changed blocks are also uploaded, because a separate copy takes longer.
   static constexpr std::size_t kGap = 65536 / sizeof(T);
 
   std::size_t upload(cudaStream_t stream, std::size_t begin, std::size_t end) {

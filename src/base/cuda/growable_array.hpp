@@ -12,9 +12,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Capacity for `count` elements, given the current capacity: unchanged if it suffices, otherwise a
-/// quarter more than `count`, but not more than `limit` unless `count` is. A count that grows in
-/// small steps then causes O(log count) reallocations.
+/// New capacity for `count` elements: the current capacity if it suffices, otherwise a quarter more
+/// than `count`, limited to `limit` unless `count` exceeds it. A count that grows in small steps
+/// then causes O(log count) reallocations.
 constexpr std::size_t geometric_capacity(
     std::size_t capacity, std::size_t count,
     std::size_t limit = std::numeric_limits<std::size_t>::max()) {
@@ -32,18 +32,18 @@ class GrowableArray {
   GrowableArray& operator=(const GrowableArray&) = delete;
 
   /// If the capacity is smaller than `count`, reallocates to exactly `count` elements, in the
-  /// Memory that `allocate(bytes)` returns. If that throws, the array is unchanged.
+  /// Memory that `allocate(bytes)` returns. If `allocate` throws, the array is unchanged.
   /// @return whether the array was reallocated.
   template <typename Allocate>
   bool reserve(std::size_t count, const Allocate& allocate) {
     if (count <= capacity_) return false;
-    // A number of bytes that overflows is clamped, so that the allocation fails.
+    // Clamps a size that overflows, so that the allocation fails.
     constexpr std::size_t kMaxCount = std::numeric_limits<std::size_t>::max() / sizeof(T);
     memory_ = allocate(std::min(count, kMaxCount) * sizeof(T));
     capacity_ = count;
     return true;
   }
-  /// The same, but a reallocation adds the slack of geometric_capacity().
+  /// reserve() with the slack of geometric_capacity().
   template <typename Allocate>
   bool reserve_geometric(std::size_t count, const Allocate& allocate) {
     return reserve(geometric_capacity(capacity_, count), allocate);

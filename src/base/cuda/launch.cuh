@@ -27,18 +27,18 @@ void launch_sharing(std::size_t shared_bytes, void (*kernel)(Parameters...), uns
   config.dynamicSmemBytes = shared_bytes;
   config.stream = stream;
   config.attrs = &overlap;
-  config.numAttrs = has_hopper_code() ? 1 : 0;  // older code cannot wait
+  config.numAttrs = has_hopper_code() ? 1 : 0;  // older code does not support the wait
   JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, kernel, Parameters(arguments)...));
 }
-/// The same, without dynamic shared memory.
+/// launch() without dynamic shared memory.
 template <typename... Parameters, typename... Arguments>
 void launch(void (*kernel)(Parameters...), unsigned blocks_x, unsigned blocks_y, unsigned threads,
             cudaStream_t stream, const Arguments&... arguments) {
   launch_sharing(0, kernel, blocks_x, blocks_y, threads, stream, arguments...);
 }
 
-/// Waits until the writes of all earlier kernels of the stream are visible. Every kernel that
-/// launch() launches must call it, because the wait covers only the previous kernel.
+/// Waits until the writes of all earlier kernels of the stream are visible. Every kernel started by
+/// launch() must call it, because the wait covers only the previous kernel.
 __device__ inline void wait_for_previous_kernel() {
 #if __CUDA_ARCH__ >= 900
   cudaGridDependencySynchronize();

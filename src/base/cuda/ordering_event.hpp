@@ -18,7 +18,7 @@ class OrderingEvent {
   OrderingEvent(const OrderingEvent&) = delete;
   OrderingEvent& operator=(const OrderingEvent&) = delete;
 
-  /// Later work of `second` waits for all earlier work of `first`.
+  /// Makes later work of `second` wait for all earlier work of `first`.
   void order(cudaStream_t first, cudaStream_t second) {
     JFPX_CUDA_TRY(cudaEventRecord(event_, first));
     JFPX_CUDA_TRY(cudaStreamWaitEvent(second, event_, 0));

@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 namespace cuda {
 
 /// Status of a device. Does not throw for a missing or unusable device, and leaves no CUDA error
-/// behind.
+/// pending.
 BackendStatus probe(int device = 0);
 
 /// Returns the reason why a device cannot be used.

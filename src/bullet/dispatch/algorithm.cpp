@@ -16,15 +16,15 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 // Bullet does not check that an object fits into an element of its pool, whose default size is that
-// of its largest algorithm. An object no larger than the algorithm that it replaces fits into every
-// pool that Bullet's algorithm fits into.
+// of its largest algorithm. An object no larger than the replaced algorithm fits into every pool
+// that supports Bullet's algorithm.
 static_assert(sizeof(SphereSphereAlgorithm) <= sizeof(btSphereSphereCollisionAlgorithm));
 static_assert(alignof(SphereSphereAlgorithm) <= 16, "the alignment of Bullet's pools");
 
 namespace {
 
 SphereInstance sphere_of(const btCollisionObjectWrapper& body) {
-  // The wrapper's transform, which is that of the child if the body is a compound.
+  // The wrapper's transform is that of the child if the body is a compound.
   const btVector3& centre = body.getWorldTransform().getOrigin();
   return {{centre.x(), centre.y(), centre.z()},
           static_cast<const btSphereShape*>(body.getCollisionShape())->getRadius()};

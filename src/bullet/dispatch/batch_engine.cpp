@@ -90,20 +90,20 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
 }
 
 /// Runs all stages before the commit, and all operations that may throw. Returns false and sets
-/// `*fallback` if a batch gains nothing without spheres, or if an operation failed (failures of a
-/// device are handled in find_touching()).
+/// `*fallback` if a batch without spheres gains nothing, or if an operation failed.
+/// find_touching() handles failures of a device.
 bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                           btOverlappingPairCache& cache, Fallback* fallback) {
   try {
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
-    // Other pairs gain only from several threads.
+    // Pairs of other shapes gain only from several threads.
     if (spheres < 2 && pool_.threads() == 1) {
       *fallback = Fallback::no_spheres;
       return false;
     }
     order_reason_ = reason_for_order(batch_, traits.may_override_filter);
-    // A pair cache of a user's class may observe the traversal itself.
+    // A user-defined pair cache may observe the traversal itself.
     if (order_reason_ == OrderReason::none && !is_exactly<btHashedOverlappingPairCache>(cache)) {
       order_reason_ = OrderReason::pair_cache;
     }
@@ -126,7 +126,7 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
 }
 
 /// If the collider fails, for example because its device is lost, a CPU collider replaces it
-/// permanently. A CPU collider that runs out of memory is kept, and the next dispatch tries again.
+/// permanently. A CPU collider that runs out of memory is kept and retried in the next dispatch.
 void BatchEngine::find_touching() {
   try {
     touching_ = collider_->find_touching(batch_.spheres(), batch_.pairs());
@@ -208,7 +208,7 @@ void BatchEngine::visit_remaining(btCollisionDispatcher& dispatcher, btOverlappi
   constexpr std::size_t kAhead = 4;
   const std::span<const std::uint32_t> remaining = unordered_commit_.remaining();
   const std::size_t n = pairs_.size();
-  // The array may grow and be reallocated while Bullet's algorithms run.
+  // Bullet's algorithms may reallocate the array.
   const auto visit = [&](std::size_t i) {
     if (i >= pairs_of(cache).size()) return;
     (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
@@ -250,7 +250,7 @@ void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInf
 }
 
 /// Checks pairs of a sphere and a box or plane after an unordered commit. Bullet's algorithm calls
-/// no global callback here, because otherwise the order would be observable.
+/// no global callback here; with such a callback, the order would be observable.
 void BatchEngine::check_convex(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info) {
   convex_check_.for_each(
       unordered_commit_.remaining(), [&](std::size_t i, const btPersistentManifold& before) {

@@ -17,20 +17,20 @@ namespace bullet {
 /// Properties of the class of a dispatcher.
 struct DispatcherTraits {
   bool may_override_filter;  ///< needsCollision() must be called for every pair
-  bool reports_releases;     ///< note_release() is called for every manifold that it releases
+  bool reports_releases;     ///< note_release() is called for every released manifold
 };
 
 /// Runs dispatches as batches. One engine may serve several dispatchers, one call at a time,
-/// because it validates the state that it keeps between dispatches before it uses it.
+/// because it validates the state of earlier dispatches before use.
 class JFPX_API BatchEngine {
  public:
   /// @throws InvalidArgument if `collider` is null.
   BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options);
 
   /// Has the effect of dispatcher.btCollisionDispatcher::dispatchAllCollisionPairs.
-  /// @param argument the dispatcher that is passed on to the traversal of the pair cache
+  /// @param argument the dispatcher argument for the traversal of the pair cache
   /// @return false if Bullet must run this dispatch: no body or manifold has been changed, and
-  ///   stats().last_fallback is the reason.
+  ///   stats().last_fallback is the reason
   bool dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                 btOverlappingPairCache& cache, const btDispatcherInfo& info,
                 btDispatcher* argument);

@@ -1,4 +1,4 @@
-/// Construction of the object wrapper that Bullet's algorithms take.
+/// Construction of the object wrapper for Bullet's algorithms.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -10,7 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Same as the dispatcher's wrapper for a body, which is not a child of another shape.
+/// Equals the dispatcher's wrapper for a body, which is not a child of another shape.
 inline btCollisionObjectWrapper wrapper_of(const btCollisionObject& body) {
   return {nullptr, body.getCollisionShape(), &body, body.getWorldTransform(), -1, -1};
 }

@@ -1,6 +1,6 @@
 /// Specialization of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
-/// Bullet 3.24), and of btConvexConvexAlgorithm for a sphere and a box. Bullet's inline functions
-/// do the vector arithmetic, so the operations are Bullet's.
+/// Bullet 3.24), and of btConvexConvexAlgorithm for a sphere and a box. The vector arithmetic uses
+/// Bullet's inline functions, so the operations are the same.
 #include "src/bullet/dispatch/contact_point.hpp"
 
 #include <jfpx/math.hpp>

@@ -1,4 +1,4 @@
-/// Updates of manifolds with the results of Bullet's algorithms, but without calling them.
+/// Updates of manifolds with the results of Bullet's algorithms, computed without calling them.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -13,18 +13,18 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Whether a user's function may combine the materials of a contact.
+/// Whether a user-defined function may combine the materials of a contact.
 bool materials_are_combined_by_user();
 /// Whether gContactStartedCallback, gContactEndedCallback or gContactDestroyedCallback is set, or
 /// materials_are_combined_by_user().
 bool contacts_are_observed();
 
-/// The collision flags of bodies whose contacts need more than write_contact() even without
+/// The collision flags of bodies for whose contacts write_contact() is insufficient even without
 /// callbacks.
 int special_collision_flags();
 
-/// False for a contact that Bullet must compute, because the bits of the NaN that an operation
-/// returns depend on the processor and the compiler.
+/// False for a contact that Bullet must compute, because the NaN bits of a result depend on the
+/// processor and the compiler.
 inline bool has_finite_values(const PairContact& contact) {
   const Vec3& normal = contact.normal;
   return is_finite(normal.x + normal.y + normal.z + contact.distance);
@@ -35,15 +35,15 @@ inline bool has_finite_values(const PairContact& contact) {
 void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
                    const PackedBody& b, Real radius_b);
 
-/// Updates the manifold of a sphere and a box, in either order, as btConvexConvexAlgorithm without
-/// perturbation does. The shapes must be exactly btSphereShape and btBoxShape.
-/// @return false if the pair needs Bullet's penetration depth solver: nothing has been changed.
+/// Updates the manifold of a sphere and a box, in either order, like btConvexConvexAlgorithm
+/// without perturbation. The shapes must be exactly btSphereShape and btBoxShape.
+/// @return false, without a change, if the pair needs Bullet's penetration depth solver
 bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
                        const btCollisionObject& body_b, bool sphere_first);
 
-/// Updates the manifold of a sphere and a plane as btConvexPlaneCollisionAlgorithm does. The shapes
+/// Updates the manifold of a sphere and a plane like btConvexPlaneCollisionAlgorithm. The shapes
 /// must be exactly btSphereShape and btStaticPlaneShape.
-/// @return false if a value is not finite: nothing has been changed.
+/// @return false, without a change, if a value is not finite
 bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject& body_a,
                          const btCollisionObject& body_b, bool sphere_first);
 

@@ -14,7 +14,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// Runs `algorithm` on the manifold `before` and compares the result with the current manifold,
-/// which is left unchanged.
+/// which does not change.
 /// @return the first field that differs.
 std::optional<FieldDifference> check_update(btCollisionAlgorithm& algorithm,
                                             const btDispatcherInfo& info,

@@ -3,7 +3,7 @@
 /// In Bullet 3.24, processCollision() of the algorithms of PairTable has no global state and no
 /// profile zone, calls no dispatcher once the manifold exists, and ignores the debug drawer.
 /// Polyhedra are the exception, because btPolyhedralContactClipping counts its tests in global
-/// variables; two boxes may have polyhedral features only in a btConvexConvexAlgorithm.
+/// variables; boxes can have polyhedral features only in a btConvexConvexAlgorithm.
 #include "src/bullet/dispatch/convex_commit.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
@@ -27,8 +27,8 @@ bool is_convex(const btCollisionObject& body, unsigned traits) {
   return type_info_of(*body.getCollisionShape()) == &typeid(btSphereShape);
 }
 
-/// Whether the shapes of pair i are those for which its algorithm was created: the user may have
-/// replaced one since.
+/// Whether the shapes of pair i are those for which its algorithm was created, because the user may
+/// have replaced a shape since.
 bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
   const unsigned a = batch.trait_a(i), b = batch.trait_b(i);
   switch (batch.kind(i)) {
@@ -48,8 +48,8 @@ bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
   return false;
 }
 
-/// Updates a sphere and a box or plane without Bullet's algorithm. Returns false for other shapes,
-/// and if nothing has been changed because the contact needs Bullet's algorithm.
+/// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
+/// for other shapes and for contacts that need Bullet's algorithm.
 bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts) {
   const bool sphere_first = (batch.trait_a(i) & kSphere) != 0;
   const unsigned other = sphere_first ? batch.trait_b(i) : batch.trait_a(i);
@@ -104,7 +104,7 @@ bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* 
   if (!has_expected_shapes(batch, i)) return false;
   const unsigned traits = batch.either_trait(i);
   if ((traits & kActive) == 0) return true;
-  // The qualified function, because no class overrides it here.
+  // Qualified call, because no class overrides the function here.
   if ((traits & kHasIgnoreList) != 0 && !dispatch.dispatcher.btCollisionDispatcher::needsCollision(
                                             batch.body_a(i), batch.body_b(i))) {
     return true;

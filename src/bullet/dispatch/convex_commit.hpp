@@ -20,12 +20,12 @@ struct CommitCounts {
   std::uint64_t written = 0;        ///< sphere pairs updated without Bullet's algorithm
   std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
-  std::uint64_t convex_pairs = 0;   ///< other convex pairs, updated by Bullet's algorithms if near
+  std::uint64_t convex_pairs = 0;   ///< other convex pairs, updated by Bullet's algorithms if close
 
   CommitCounts& operator+=(const CommitCounts& other);
 };
 
-/// What the pairs of a dispatch have in common.
+/// Common arguments of the pairs of a dispatch.
 struct ConvexDispatch {
   btCollisionDispatcher& dispatcher;
   const btDispatcherInfo& info;
@@ -35,11 +35,11 @@ struct ConvexDispatch {
   bool runs_algorithms;
 };
 
-/// Updates the manifold of pair i on the calling thread, if no other pair and no user code can
-/// observe this: the algorithm and both shapes are exactly classes of Bullet whose functions only
-/// read the bodies and write the manifold of the pair. Spheres with boxes and planes are computed
-/// without Bullet's algorithm.
-/// @return false if Bullet must process the pair.
+/// Updates the manifold of pair i on the calling thread, if neither other pairs nor user code can
+/// observe the update: the algorithm and both shapes must be exactly classes of Bullet whose
+/// functions only read the bodies and write the manifold of the pair. Spheres with boxes and planes
+/// are computed without Bullet's algorithm.
+/// @return false if Bullet must process the pair
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
 
 }  // namespace bullet

@@ -1,5 +1,4 @@
-/// The public dispatcher: runs a batch where the engine supports it, and Bullet's dispatch
-/// elsewhere.
+/// The public dispatcher: runs a batch if the engine supports it, and otherwise Bullet's dispatch.
 #include <jfpx/bullet/dispatcher.hpp>
 
 #include "src/bullet/dispatch/batch_engine.hpp"

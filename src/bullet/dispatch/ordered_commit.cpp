@@ -42,7 +42,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   std::uint64_t written() const { return written_; }
 
  private:
-  /// Prefetch distance: long enough to hide memory latency, short enough for the cache.
+  /// Prefetch distance: hides memory latency, and the prefetched lines stay in the cache.
   static constexpr std::size_t kAhead = 12;
 
   void prefetch_commit(std::size_t i) const {
@@ -93,7 +93,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     if (!dispatcher_.needsCollision(a, b)) return false;
     ++written_;
     manifold->setNumContacts(0);
-    // The current materials, because callbacks may change those of their bodies.
+    // Reads the current materials, because callbacks may change those of their bodies.
     if (contact != nullptr) {
       write_contact(manifold, *contact, state_of(*a), state_of(*b), batch_.radius_b(i));
     }

@@ -12,17 +12,17 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// One traversal of all pairs, driven by the pair cache itself, so that the order is Bullet's for
-/// every class of cache. A touching pair is written in place if no callback can observe it;
-/// otherwise it is passed to Bullet's near callback, like every pair that is not of two spheres.
+/// One traversal of all pairs by the pair cache itself, so that the order is Bullet's for every
+/// class of cache. A touching pair is written in place if no callback can observe it. All other
+/// pairs, including those of other shapes, are passed to Bullet's near callback.
 class OrderedCommit {
  public:
-  /// Called after the visit of each sphere pair. `current` is false if a filter may have left its
-  /// manifold unchanged, and true if the manifold matches the contacts.
+  /// Called after the visit of each sphere pair. `current` is true if the manifold matches the
+  /// contacts, and false if a filter may have prevented its update.
   using Visited = std::function<void(std::size_t i, bool current)>;
 
   /// Determines the action for each pair from the current manifolds. `may_override_filter`: the
-  /// dispatcher's class may override needsCollision(). The only function that can throw by itself.
+  /// dispatcher's class may override needsCollision(). Only this function itself can throw.
   CommitCounts plan(const SphereBatch& batch, std::span<const PairContact> touching,
                     bool may_override_filter);
   /// @return the number of manifolds written.
@@ -35,7 +35,7 @@ class OrderedCommit {
   enum class Action : std::uint8_t {
     stock,   ///< not two spheres, or a pair without Bullet's own sphere-sphere algorithm
     skip,    ///< does not touch and has no points, so nothing can change
-    filter,  ///< as skip, but a user's override of the collision filter must be called
+    filter,  ///< like skip, but a user-defined collision filter must be called
     commit,  ///< touches or has points
   };
   class Walk;

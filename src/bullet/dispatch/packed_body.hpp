@@ -1,4 +1,4 @@
-/// Compact copy of the body fields that a contact reads; in Bullet they occupy five cache lines.
+/// Compact copy of the body fields that a contact reads, which occupy five cache lines in Bullet.
 #pragma once
 
 #include <jfpx/config.hpp>

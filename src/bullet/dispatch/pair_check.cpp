@@ -44,7 +44,7 @@ std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDisp
                                           const btPersistentManifold& thresholds,
                                           const btPersistentManifold* manifold) {
   const CallbacksDisabled callbacks_disabled;
-  // The bodies of the manifold, which the user may have exchanged.
+  // Uses the bodies of the manifold, whose order the user may have changed.
   btPersistentManifold scratch(thresholds.getBody0(), thresholds.getBody1(), 0,
                                thresholds.getContactBreakingThreshold(),
                                thresholds.getContactProcessingThreshold());

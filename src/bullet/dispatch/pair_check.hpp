@@ -14,9 +14,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// Runs btSphereSphereCollisionAlgorithm on a scratch manifold and compares the result with the
-/// collider's contact, which is null if it found none, and, unless `manifold` is null, with the
-/// current manifold. If the contact is not finite, only that property is compared, because Bullet
-/// computes such contacts. Global contact callbacks are disabled during the check.
+/// collider's contact (null: no contact) and, unless `manifold` is null, with the current manifold.
+/// If the contact is not finite, only this property is compared, because Bullet computes such
+/// contacts. Global contact callbacks are disabled during the check.
 /// @return the first field that differs.
 std::optional<FieldDifference> check_pair(btDispatcher* dispatcher, const btDispatcherInfo& info,
                                           const btCollisionObject& body_a,

@@ -27,9 +27,9 @@ struct AlgorithmFields : btCollisionAlgorithm {
 };
 
 /// Access to private members through explicit instantiation, which the language exempts from access
-/// checks: the number of perturbations and the penetration depth solver, which a
-/// btConvexConvexAlgorithm copies from its configuration when it is created, and whether the plane
-/// is the first body of a btConvexPlaneCollisionAlgorithm.
+/// checks. Of a btConvexConvexAlgorithm: the number of perturbations and the penetration depth
+/// solver, which it copies from its configuration. Of a btConvexPlaneCollisionAlgorithm: whether
+/// the plane is the first body.
 struct PerturbationTag {
   friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
 };
@@ -48,13 +48,13 @@ template struct Reveal<DepthSolverTag, &btConvexConvexAlgorithm::m_pdSolver>;
 template struct Reveal<PlaneFirstTag, &btConvexPlaneCollisionAlgorithm::m_isSwapped>;
 
 /// Whether Bullet's EPA computes the penetration of deep contacts. Unlike
-/// btMinkowskiPenetrationDepthSolver, it has no state that threads would share.
+/// btMinkowskiPenetrationDepthSolver, it has no state shared by threads.
 bool uses_epa(const btConvexConvexAlgorithm& algorithm) {
   const btConvexPenetrationDepthSolver* solver = algorithm.*member_of(DepthSolverTag());
   return solver != nullptr && is_exactly<btGjkEpaPenetrationDepthSolver>(*solver);
 }
 
-/// The manifold of an algorithm of exactly this class; null if it has none of its own. The call is
+/// The manifold of an algorithm of exactly this class; null if it does not own one. The call is
 /// qualified, so that it can be inlined.
 template <class Algorithm>
 btPersistentManifold* manifold_of(btCollisionAlgorithm* algorithm) {
@@ -102,7 +102,7 @@ void PairTable::resize(std::size_t pairs) {
 
 /// Builds the Bloom filter of was_released(), with at least 32 bits per manifold, two of which are
 /// set. The false-positive rate is about 1 in 100. With one bit it would be about 1 in 10, and
-/// reading those links again cost more than all other work for releases.
+/// rereading those links would cost more than all other work for releases.
 void PairTable::build_release_filter() {
   if (released_.empty()) return;
   const std::size_t bits = std::bit_ceil(std::max<std::size_t>(1024, 32 * released_.size()));
@@ -159,7 +159,7 @@ PairTable::Link PairTable::read_link(btCollisionAlgorithm* algorithm, const Pair
     manifold = manifold_of<btConvexConvexAlgorithm>(algorithm);
     kind = PairKind::convex;
   } else if (type == &typeid(btConvexPlaneCollisionAlgorithm)) {
-    // Its perturbation applies to polyhedra only.
+    // The perturbation of this algorithm applies to polyhedra only.
     auto* plane = static_cast<btConvexPlaneCollisionAlgorithm*>(algorithm);
     manifold = manifold_of<btConvexPlaneCollisionAlgorithm>(algorithm);
     kind = plane->*member_of(PlaneFirstTag()) ? PairKind::plane_convex : PairKind::convex_plane;

@@ -1,4 +1,4 @@
-/// Data of the pairs of a pair cache that is kept from one dispatch to the next.
+/// Data of the pairs of a pair cache that persist between dispatches.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -25,7 +25,7 @@ inline constexpr std::size_t kPairChunk = 2048;
 
 /// Class of Bullet's algorithm of a pair.
 enum class PairKind : std::uint8_t {
-  other,         ///< no algorithm yet, or one that only Bullet can run
+  other,         ///< no algorithm yet, or one that Bullet must run
   spheres,       ///< btSphereSphereCollisionAlgorithm with a manifold
   convex,        ///< btConvexConvexAlgorithm with a manifold, Bullet's EPA, without perturbation
   convex_plane,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane second
@@ -33,19 +33,19 @@ enum class PairKind : std::uint8_t {
   boxes,         ///< btBoxBoxCollisionAlgorithm with a manifold
 };
 
-/// The dispatcher that runs the dispatch. Its own algorithms may be cached; an algorithm that
-/// another dispatcher has created is read in every refresh().
+/// The dispatcher that runs the dispatch. Its own algorithms may be cached; algorithms of other
+/// dispatchers are read in every refresh().
 struct PairOwner {
   const btDispatcher* dispatcher;
   /// Whether note_release() is called for every manifold that this dispatcher releases. If so, the
-  /// manifold of an algorithm is read once; otherwise it is read in every refresh(), because an
-  /// algorithm may have been destroyed and another one created at the same address.
+  /// manifold of an algorithm is read once. Otherwise it is read in every refresh(), because
+  /// another algorithm may have been created at the address of a destroyed one.
   bool reports_releases;
 };
 
-/// One entry per pair, in the order of the pair array. An entry is valid as long as the array holds
+/// One entry per pair, in the order of the pair array. An entry is valid while the array contains
 /// the same proxies and the same algorithm, and the algorithm's manifold has not been released. No
-/// cached pointer is dereferenced before that is established.
+/// cached pointer is dereferenced before this check.
 class PairTable {
  public:
   /// Updates the entries to the current pair array. May throw; see invalidate().
@@ -63,8 +63,8 @@ class PairTable {
   const ProxyTable& proxies() const { return proxies_; }
 
  private:
-  /// The manifold and the kind of a pair, and whether they may be cached; otherwise they are read
-  /// again in every dispatch. Packed into one word, because every dispatch streams all links twice.
+  /// The manifold and the kind of a pair, and whether they may be cached; otherwise they are reread
+  /// in every dispatch. Packed into one word, because every dispatch streams all links twice.
   class Link {
    public:
     Link() = default;

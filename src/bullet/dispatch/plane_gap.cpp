@@ -1,4 +1,4 @@
-/// Bounds the distance that Bullet computes. With the poses x -> B x + c of the body and
+/// Lower bound of the distance that Bullet computes. With the poses x -> B x + c of the body and
 /// x -> P x + o of the plane n x = k, the distance of a point v is
 ///   n P^T (B v + c - o) - k  >=  (P n) (c - o) - k - |B^T P n| |v|.
 /// A perturbation selects another point of the shape. The bases need not be orthonormal.
@@ -14,7 +14,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Upper bound of the factor by which a matrix lengthens a vector.
+/// Upper bound of the factor by which a matrix scales the length of a vector.
 btScalar norm(const btMatrix3x3& m) {
   return std::sqrt(m[0].length2() + m[1].length2() + m[2].length2());
 }
@@ -31,7 +31,7 @@ bool is_clear_of_plane(const btCollisionObject& body, btScalar radius,
   const btScalar constant = shape.getPlaneConstant();
   const btScalar of_origin = normal.dot(pose.getOrigin() - plane_pose.getOrigin()) - constant;
   const btScalar reach = radius * (normal * basis).length();
-  // More than the rounding errors of all operations here and in Bullet together.
+  // Exceeds the rounding errors of all operations here and in Bullet together.
   constexpr btScalar kRounding = 256 * std::numeric_limits<btScalar>::epsilon();
   const btScalar size =
       pose.getOrigin().length() + plane_pose.getOrigin().length() + norm(basis) * radius;

@@ -9,9 +9,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Whether btConvexPlaneCollisionAlgorithm, with any perturbation, finds all points of a convex
-/// body farther than `threshold` from a plane. Then it does not change a manifold without points.
-/// False where rounding might decide, and for numbers that are not finite.
+/// Whether btConvexPlaneCollisionAlgorithm, with any perturbation, computes a distance above
+/// `threshold` for all points of a convex body and a plane. It then does not change a manifold
+/// without points. False if rounding might decide, and for values that are not finite.
 /// @param radius [m], of a sphere about the body's origin that contains its shape with its margin
 /// @param plane a body with a btStaticPlaneShape
 bool is_clear_of_plane(const btCollisionObject& body, btScalar radius,

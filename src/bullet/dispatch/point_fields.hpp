@@ -1,4 +1,4 @@
-/// Comparison of contact points and manifolds by named field, which never reads padding.
+/// Bitwise comparison of contact points and manifolds by named field, without padding.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -38,7 +38,7 @@ class FieldComparison {
                 static_cast<std::uint32_t>(expected), static_cast<std::uint32_t>(actual)};
     }
   }
-  /// Compares all four components, because Bullet copies the unused one like the others.
+  /// Compares all four components, because Bullet also copies the unused component.
   void operator()(const char* name, const btVector3& expected, const btVector3& actual) {
     static constexpr const char* kSuffix[] = {".x", ".y", ".z", ".w"};
     for (int i = 0; i < 4 && !first_; ++i) {
@@ -63,8 +63,8 @@ class FieldComparison {
   std::optional<FieldDifference> first_;
 };
 
-/// Compares every field of a point. Of the user's pointer, only whether it is set is compared,
-/// because two worlds may have different ones.
+/// Compares every field of a point. The user's pointer is only compared for being set, because
+/// two worlds may have different pointers.
 inline void compare_points(const btManifoldPoint& e, const btManifoldPoint& a, FieldComparison* c) {
   (*c)("m_localPointA", e.m_localPointA, a.m_localPointA);
   (*c)("m_localPointB", e.m_localPointB, a.m_localPointB);

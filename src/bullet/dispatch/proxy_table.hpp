@@ -13,9 +13,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// An open-addressing hash table over proxy addresses. The address is the only key that can be read
-/// without dereferencing the proxy; besides, unique ids of btDbvtBroadphase grow without bound, and
-/// array indices belong to one world.
+/// An open-addressing hash table over proxy addresses. Only the address can be used without
+/// dereferencing the proxy. Moreover, unique ids of btDbvtBroadphase grow without bound, and array
+/// indices belong to one world.
 class ProxyTable {
  public:
   void clear() {
@@ -29,8 +29,7 @@ class ProxyTable {
     }
   }
 
-  /// Upper bound of the indices. An index without references belongs to a proxy that may have been
-  /// destroyed.
+  /// Upper bound of the indices. The proxy of an index without references may have been destroyed.
   std::size_t size() const { return proxies_.size(); }
   bool in_use(std::size_t number) const { return users_[number] != 0; }
   btBroadphaseProxy* proxy(std::size_t number) const { return proxies_[number]; }
@@ -38,7 +37,7 @@ class ProxyTable {
   bool wasteful() const { return proxies_.size() > 2 * in_use_ + 1024; }
 
   /// Prefetches the proxy's entry. Lookups are as random as the pairs, and a table of a few
-  /// thousand proxies is larger than the L1 cache.
+  /// thousand proxies exceeds the L1 cache.
   void prefetch(const btBroadphaseProxy* proxy) const { jfpx::prefetch(&entries_[home(proxy)]); }
 
   /// Adds a reference to the proxy and returns its index; a new proxy gets the next index.
@@ -57,7 +56,8 @@ class ProxyTable {
   };
 
   /// Two rounds of multiplication and folding. One round (Fibonacci hashing) is insufficient:
-  /// proxies lie at nearly equal distances, which it maps to runs of 17 to 25 occupied entries.
+  /// proxies have nearly equal distances, which one round maps to runs of 17 to 25 occupied
+  /// entries.
   std::size_t home(const btBroadphaseProxy* proxy) const {
     constexpr std::uint64_t kMultiplier = 0x9e3779b97f4a7c15u;
     std::uint64_t hash = reinterpret_cast<std::uintptr_t>(proxy) * kMultiplier;

@@ -19,7 +19,7 @@ namespace bullet {
 enum BodyTrait : std::uint8_t {
   kSphere = 1,
   kActive = 2,
-  /// Its class may override btCollisionObject::checkCollideWithOverride, which would be called.
+  /// Its class may override btCollisionObject::checkCollideWithOverride, which must be called.
   kOverridesFilter = 4,
   kBox = 8,              ///< exactly a btBoxShape
   kPlane = 16,           ///< exactly a btStaticPlaneShape
@@ -35,11 +35,11 @@ inline const PairContact* first_contact(std::span<const PairContact> touching, s
       [](const PairContact& contact, std::size_t i) { return contact.pair < i; });
 }
 
-/// Bodies and pairs of one dispatch, in the form that the collider and the commit read.
+/// Bodies and pairs of one dispatch, in the form for the collider and the commit.
 class SphereBatch {
  public:
-  /// Sets the expected number of contacts. If it is larger than the number of bodies, gather()
-  /// copies the body fields that contacts need; otherwise they are read on demand.
+  /// Sets the expected number of contacts. If it exceeds the number of bodies, gather() copies the
+  /// body fields that contacts need; otherwise they are read on demand.
   void expect_contacts(std::size_t contacts) { expected_contacts_ = contacts; }
   /// Reads the bodies of `pairs`, and returns the number of spheres among them.
   std::size_t gather(std::span<const btBroadphasePair> pairs, const PairOwner& owner,
@@ -51,8 +51,8 @@ class SphereBatch {
   void invalidate() noexcept { table_.invalidate(); }
 
   /// One entry per body. A body that is not a sphere has a radius of NaN. The collider therefore
-  /// reports each of its pairs as touching, and the commit rejects these pairs, which costs less
-  /// than a test of every pair.
+  /// reports each of its pairs as touching, and the commit rejects them, which costs less than
+  /// testing every pair.
   std::span<const SphereInstance> spheres() const { return spheres_; }
   std::span<const SpherePair> pairs() const { return table_.pairs(); }
 

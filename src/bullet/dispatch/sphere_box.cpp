@@ -1,8 +1,8 @@
-/// GJK in two parts, as in Bullet 3.24 (btGjkPairDetector.cpp): a test whether the cores, a point
-/// and a box, intersect, and the distance between them (G. van den Bergen, "A Fast and Robust GJK
+/// GJK in two parts, as in Bullet 3.24 (btGjkPairDetector.cpp): an intersection test of the cores,
+/// a point and a box, and the distance between them (G. van den Bergen, "A Fast and Robust GJK
 /// Implementation for Collision Detection of Convex Objects", 1999). The first part follows
 /// libccd's GJK, which Bullet uses, including the triangle distance in double and the fuzzy
-/// comparisons. Bullet's own inline functions and simplex solver do the arithmetic where possible.
+/// comparisons. The arithmetic uses Bullet's inline functions and simplex solver if possible.
 #include "src/bullet/dispatch/sphere_box.hpp"
 
 #include <jfpx/math.hpp>
@@ -19,7 +19,7 @@ namespace {
 constexpr btScalar kRelativeError = sizeof(btScalar) == 8 ? btScalar(1.0e-12) : btScalar(1.0e-6);
 constexpr int kMaxIterations = 1000;
 
-/// The cores relative to the midpoint of the two bodies, which keeps the values small.
+/// The cores relative to the midpoint of the two bodies, for better precision.
 class Cores {
  public:
   explicit Cores(const SphereBoxInput& input)
@@ -70,7 +70,7 @@ btVector3 triple_cross(const btVector3& a, const btVector3& b, const btVector3& 
   return a.cross(b).cross(c);
 }
 
-/// Squared distance of `p` and the segment from `x0` to `b`. Bullet uses both ways of rounding.
+/// Squared distance of `p` and the segment from `x0` to `b`. Bullet uses both orders of rounding.
 btScalar segment_distance2(const btVector3& p, const btVector3& x0, const btVector3& b,
                            bool by_point) {
   btVector3 d = b - x0;
@@ -304,7 +304,7 @@ SphereBoxResult find_closest_points(const SphereBoxInput& input, SphereBoxContac
   on_b += axis * (input.margin_b / btSqrt(squared_distance));
   btVector3 normal = axis;
   normal *= k;
-  // The normal must point from b to a: compare the gaps that it and its opposite leave.
+  // The normal must point from b to a: compares the gaps along the normal and its opposite.
   const btScalar gap = normal.dot(cores.support(-normal)) - margin;
   const btScalar opposite_gap = (-normal).dot(cores.support(normal)) - margin;
   if (opposite_gap > gap) normal *= -1;

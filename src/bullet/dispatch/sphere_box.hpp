@@ -1,4 +1,4 @@
-/// Closest points of a sphere and a box, computed as btGjkPairDetector does.
+/// Closest points of a sphere and a box, equal to those of btGjkPairDetector.
 #pragma once
 
 #include <jfpx/config.hpp>

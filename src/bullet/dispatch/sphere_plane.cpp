@@ -1,5 +1,5 @@
-/// The lowest point of a sphere above a plane, which btSphereShape computes. Bullet's inline
-/// functions do the arithmetic.
+/// The lowest point of a sphere above a plane, as in btSphereShape. The arithmetic uses Bullet's
+/// inline functions.
 #include "src/bullet/dispatch/sphere_plane.hpp"
 
 #include <BulletCollision/CollisionShapes/btSphereShape.h>

@@ -1,4 +1,4 @@
-/// Closest points of a sphere and a plane, computed as btConvexPlaneCollisionAlgorithm does.
+/// Closest points of a sphere and a plane, equal to those of btConvexPlaneCollisionAlgorithm.
 #pragma once
 
 #include <jfpx/config.hpp>

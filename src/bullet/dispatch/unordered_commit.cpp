@@ -1,6 +1,6 @@
-/// First the pairs of spheres, in two passes per chunk: a scan of the numbers of contact points,
-/// which completes most pairs, and a visit of each other pair. Then the convex pairs among those
-/// that remain, which take a hundred times as long, in small chunks.
+/// Processes the pairs of spheres first, in two passes per chunk: a scan of the numbers of contact
+/// points, which completes most pairs, and a visit of the remaining pairs. Then processes the
+/// remaining convex pairs in small chunks, because they take a hundred times as long.
 #include "src/bullet/dispatch/unordered_commit.hpp"
 
 #include "src/bullet/dispatch/contact_point.hpp"
@@ -18,11 +18,10 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// Number of pairs per chunk of the loop over convex pairs, each of which takes about a
-/// microsecond.
+/// Number of pairs per chunk of the loop over convex pairs; a pair takes about a microsecond.
 constexpr std::size_t kConvexChunk = 64;
 constexpr std::size_t kConvexAhead = 4;
-/// Number of pairs from which several threads update them; waking threads takes longer than fewer.
+/// Minimum number of pairs for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedConvexPairs = 512;
 
 void prefetch_convex(const SphereBatch& batch, std::size_t i) {
@@ -70,10 +69,10 @@ class Committer {
   /// A visit takes longer and reads a dozen cache lines.
   static constexpr std::size_t kVisitsAhead = 10;
 
-  /// The pairs that need a visit: those that touch or have points, and all that are not of two
-  /// spheres. The number of points must be read for every sphere pair of an active body, because
-  /// Bullet also clears points that a user has added. The loop does nothing else, so that it is
-  /// limited only by memory.
+  /// The pairs that need a visit: sphere pairs that touch or have points, and all other pairs. The
+  /// number of points must be read for every sphere pair of an active body, because Bullet also
+  /// clears points that a user has added. The loop does nothing else, so that it is limited only by
+  /// memory.
   std::span<const std::uint32_t> find_visits() {
     std::size_t count = 0;
     for (std::size_t i = begin_; i < std::min(end_, begin_ + kCountsAhead); ++i)
@@ -87,8 +86,7 @@ class Committer {
     }
     return with_touching({found_.data(), count});
   }
-  /// The union of two ascending lists: `found`, and the touching pairs of this range, except those
-  /// that are not active.
+  /// The union of two ascending lists: `found`, and the active touching pairs of this range.
   std::span<const std::uint32_t> with_touching(std::span<const std::uint32_t> found) {
     auto out = visits_.begin();
     const PairContact* touching = next_;
@@ -121,7 +119,7 @@ class Committer {
     batch_.prefetch_states(i);
   }
 
-  /// `contact` is null if the spheres do not touch. Returns false if the pair remains.
+  /// `contact` is null if the spheres do not touch. Returns false if Bullet must process the pair.
   bool commit(std::size_t i, const PairContact* contact) {
     if (batch_.kind(i) == PairKind::spheres) return commit_spheres(i, contact);
     if (batch_.kind(i) == PairKind::other && batch_.both_are_spheres(i)) count_pair(contact);

@@ -11,20 +11,20 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Why the order of manifold updates is observable. OrderReason::none: no global callback would be
-/// called, Bullet's functions combine the materials, and no class that may override a filter is
+/// Reason why the order of manifold updates is observable. OrderReason::none: no global callback
+/// is called, Bullet's functions combine the materials, and no class that may override a filter is
 /// involved.
 /// `may_override_filter`: the dispatcher's class may override needsCollision().
 OrderReason reason_for_order(const SphereBatch& batch, bool may_override_filter);
 
-/// Updates the manifolds of pairs of spheres, and of convex shapes. Each manifold belongs to one
+/// Updates the manifolds of pairs of spheres and of convex shapes. Each manifold belongs to one
 /// pair, so threads share no data. Bullet creates and releases the manifolds, because the order of
 /// those operations is observable.
 class UnorderedCommit {
  public:
   /// Reserves memory; the only function that can throw.
   void reserve(std::size_t pairs);
-  /// Updates the pairs that do not require Bullet, and lists the others in remaining().
+  /// Updates the pairs that do not require Bullet, and lists all others in remaining().
   CommitCounts run(const ConvexDispatch& dispatch, std::span<const PairContact> touching,
                    ThreadPool& pool);
   /// Sorts the remaining pairs into the order in which btHashedOverlappingPairCache visits them,

@@ -12,9 +12,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Holds one object for each concurrent call. An unmodified program may use its own objects in
-/// several threads, and their destruction cannot be observed, so jfpx's counterparts are not tied
-/// to them. Thread-safe.
+/// Holds one object for each concurrent call. An unmodified program may use its objects in several
+/// threads, and their destruction is not observable. jfpx's objects are therefore independent of
+/// them. Thread-safe.
 template <class Object>
 class ObjectPool {
  public:
@@ -31,7 +31,7 @@ class ObjectPool {
     }
     Handle(const Handle&) = delete;
     Handle& operator=(const Handle&) = delete;
-    /// Null if no object could be created: failure() has the reason, or memory was exhausted.
+    /// Null if no object could be created: see failure(); an allocation may also have failed.
     Object* get() const { return object_.get(); }
 
    private:
@@ -45,7 +45,7 @@ class ObjectPool {
     const std::lock_guard lock(mutex_);
     for (const auto& object : idle_) visit(*object);
   }
-  /// Reason why the pool can create no objects, permanently; otherwise empty.
+  /// Reason why the pool can permanently create no objects; otherwise empty.
   std::string failure() {
     const std::lock_guard lock(mutex_);
     return failure_;

@@ -1,11 +1,11 @@
 /// libjfpx-bullet-preload.so: replaces dispatch, solver and AABB update of unmodified, dynamically
 /// linked Bullet programs by those of jfpx.
 ///
-/// If it is listed in LD_PRELOAD, symbol lookup finds its definitions before Bullet's, also for the
-/// vtables inside Bullet's libraries, unless these are linked with -Bsymbolic-functions, as on
-/// Ubuntu: then it changes the vtables. This file depends on neither Bullet nor the C++ library,
-/// because it is loaded into programs that have neither; the engine of the right precision is
-/// loaded when Bullet first calls one of the functions.
+/// With LD_PRELOAD, symbol lookup finds its definitions before Bullet's, also for the vtables in
+/// Bullet's libraries. If these are linked with -Bsymbolic-functions, as on Ubuntu, this library
+/// changes the vtables instead. This file depends on neither Bullet nor the C++ library, because it
+/// is loaded into programs without them. The first call of one of the functions by Bullet loads the
+/// engine of the matching precision.
 #include "src/bullet/preload/preload_engine.hpp"
 #include "src/bullet/preload/vtable.hpp"
 
@@ -49,7 +49,7 @@ struct Function {
   void* replacement;           ///< the definition in this library
   pthread_once_t found = PTHREAD_ONCE_INIT;
   void* original = nullptr;
-  bool is_private = false;  ///< loaded with RTLD_LOCAL, so that other copies may exist
+  bool is_private = false;  ///< loaded with RTLD_LOCAL; other copies may exist
   const void* base = nullptr;
   void* attempt = nullptr;  ///< null if Bullet's function is always used
 };
@@ -100,13 +100,13 @@ bool is_enabled(const char* part) {
   }
 }
 
-/// The definition that the caller's library would use without this library, if it is not global.
+/// The definition that the caller's library would use without this library, if it is private.
 void* private_definition(const char* symbol, const void* caller) {
   Dl_info info;
   if (dladdr(caller, &info) == 0) return nullptr;
   void* library = dlopen(info.dli_fname, RTLD_LAZY | RTLD_NOLOAD);
   if (library == nullptr) return nullptr;
-  // The handle is not closed, because a library that calls Bullet is in use.
+  // The handle is not closed, because the library is in use: it calls Bullet.
   return dlsym(library, symbol);
 }
 
@@ -117,8 +117,8 @@ void* definition(const char* symbol, const void* caller, bool* is_private) {
   return next != nullptr ? next : private_definition(symbol, caller);
 }
 
-/// Replaces the functions in the vtables of their classes, if symbol lookup has not.
-/// @param caller null: in the libraries that the program was started with
+/// Replaces the functions in the vtables of their classes, unless symbol lookup has replaced them.
+/// @param caller null: in the libraries with which the program was started
 void replace_in_vtables(const void* caller) {
   for (const Function* function : {&g_dispatch, &g_solve, &g_update_boxes}) {
     // A program may have its own copy of the vtable, which the library then uses.
@@ -131,7 +131,7 @@ void replace_in_vtables(const void* caller) {
     std::snprintf(g_reason, sizeof g_reason, "left to Bullet: the %s's vtable can't be changed: %s",
                   function->part, std::strerror(errno));
   }
-  dlerror();  // forgets the errors of symbols that were not found
+  dlerror();  // clears the errors of missing symbols
 }
 __attribute__((constructor)) void start() { replace_in_vtables(nullptr); }
 
@@ -149,7 +149,7 @@ const char* engine_for(const Function& function, const void* address) {
   return nullptr;
 }
 
-/// The engine for the function and for all others that the caller can reach. All must have the same
+/// The engine for the function and for all others that the caller can reach. All must use the same
 /// engine, because Bullet's libraries share their classes.
 const char* common_engine(const Function& function, const void* caller) {
   const char* engine = engine_for(function, function.original);
@@ -193,7 +193,8 @@ void find_function() {
   pthread_mutex_unlock(&g_mutex);
 }
 
-/// The functions for a caller: `attempt`, which may be null, and `original` if it returns false.
+/// The functions for a caller: `attempt`, which may be null, and `original`, used if the attempt
+/// returns false.
 template <class Attempt, class Original>
 struct Choice {
   Attempt attempt;

@@ -19,7 +19,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// The state that Bullet's solver keeps from one group to the next.
+/// The state of Bullet's solver that persists between groups.
 struct SolverState : btSequentialImpulseConstraintSolver {
   static void copy(const btSequentialImpulseConstraintSolver& from,
                    btSequentialImpulseConstraintSolver* to) {
@@ -82,8 +82,8 @@ ConstraintSolverStats sum_of_stats() {
   return sum;
 }
 
-/// Copies the state from the program's solver to jfpx's, and back at the end of its lifetime, even
-/// if an exception is thrown.
+/// Copies the state from the program's solver to jfpx's solver, and back at the end of its
+/// lifetime, even after an exception.
 class SolverStateTransfer {
  public:
   SolverStateTransfer(btSequentialImpulseConstraintSolver* original, ConstraintSolver* solver)
@@ -127,7 +127,7 @@ void print_solver_summary(const char* prefix) {
 
 extern "C" {
 
-/// Supports only Bullet's own class, because a derived class may use the inherited state itself.
+/// Supports exactly Bullet's class, because a derived class may use the inherited state.
 JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count, void** manifolds,
                                      int manifold_count, void** joints, int joint_count,
                                      const void* info, void* drawer, void* dispatcher) {

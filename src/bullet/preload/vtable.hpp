@@ -1,5 +1,5 @@
-/// Replacement of virtual functions where symbol lookup does not replace them: in libraries that
-/// are linked with -Bsymbolic-functions, as Ubuntu's Bullet is. Depends on the C library alone.
+/// Replacement of virtual functions where symbol lookup does not replace them: in libraries linked
+/// with -Bsymbolic-functions, such as Ubuntu's Bullet. Depends on the C library only.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 namespace jfpx::preload {
 
 /// Replaces a function in a vtable; has no effect if the vtable does not contain it. The page of
-/// the entry remains writable. Other threads call either function.
+/// the entry remains writable. During the replacement, other threads call either function.
 /// @param vtable,original null: no effect
 /// @return false if the system does not allow it
 inline bool replace_in_vtable(void* vtable, const void* original, void* replacement) {

@@ -1,5 +1,5 @@
-/// The solver's interface and the sequence of its stages; constraint_solver_impl.hpp names the
-/// files of the other stages.
+/// The solver's interface and the sequence of its stages; constraint_solver_impl.hpp lists the
+/// files of the stages.
 #include <jfpx/error.hpp>
 
 #include "src/bullet/solver/constraint_solver_impl.hpp"
@@ -32,7 +32,7 @@ ConstraintSolver::Impl::Impl(ConstraintSolver& owner, const ConstraintSolverOpti
 
 std::optional<SolverFallback> ConstraintSolver::Impl::solve(
     std::span<btPersistentManifold* const> manifolds) {
-  // Profile zones have the names that Bullet's solver gives them.
+  // Profile zones have the names of Bullet's solver.
   BT_PROFILE("solveGroup");
   is_small = manifolds.size() < kSharedManifolds;
   joint_unlisted.clear();
@@ -77,7 +77,7 @@ void ConstraintSolver::Impl::set_up(std::span<btPersistentManifold* const> manif
     set_up_unlisted_bodies(manifolds);
   }
   if (!scan.any_rolling()) return;
-  // Bullet's function for rolling friction rows needs a solver body for the fixed body too.
+  // Bullet's function for rolling friction rows also needs a solver body for the fixed body.
   btSolverBody& fixed = self.m_tmpSolverBodyPool.expandNonInitializing();
   self.initSolverBody(&fixed, nullptr, settings.dt);
 }

@@ -22,10 +22,10 @@ namespace bullet {
 
 inline constexpr std::size_t kBodiesPerChunk = 64;
 inline constexpr std::size_t kBlocksPerChunk = 16;
-/// Number of manifolds from which several threads set up a group.
+/// Minimum number of manifolds for setting up a group with several threads.
 inline constexpr std::size_t kSharedManifolds = 2048;
 
-/// Each stage is defined in the file that is named above its declarations.
+/// Each stage is defined in the file that the comment above its declarations names.
 struct ConstraintSolver::Impl {
   using Steps = std::array<const void*, 8>;
 
@@ -53,7 +53,7 @@ struct ConstraintSolver::Impl {
   const btContactSolverInfo* info = nullptr;
   rows::RowSettings settings{};
   bool on_device = false;
-  bool is_small = false;  ///< waking other threads takes longer than the loops over the group
+  bool is_small = false;  ///< the loops over the group take less time than waking threads
 
   Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options);
 
@@ -64,7 +64,7 @@ struct ConstraintSolver::Impl {
   // group_fallback.cpp
   Steps steps() const;
   int max_iterations() const;
-  /// The reason why the group is not solved here, if there is one.
+  /// The reason why the group is not solved here, if any.
   std::optional<SolverFallback> fallback_reason(
       std::span<btPersistentManifold* const> manifolds) const;
   bool depends_on_thread_safety(std::span<btPersistentManifold* const> manifolds) const;
@@ -91,7 +91,7 @@ struct ConstraintSolver::Impl {
   rows::RowSweepReport solve_rows();
   rows::RowSweepReport sweep();
   DeviceGroup device_group();
-  /// The threads of the loops that set up the group and write its results.
+  /// The threads for setting up the group and writing its results.
   ThreadPool& pool() { return is_small ? calling_thread : solver.pool(); }
   std::uint32_t directions() const {
     return (info->m_solverMode & SOLVER_USE_2_FRICTION_DIRECTIONS) != 0 ? 2 : 1;

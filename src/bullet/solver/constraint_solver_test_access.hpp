@@ -14,10 +14,10 @@ class GroupSolver;
 namespace bullet {
 
 struct JFPX_API ConstraintSolverTestAccess {
-  /// Makes a solver that uses `device` as its GPU, as options.backend specifies.
+  /// Creates a solver that uses `device` as its GPU, as options.backend specifies.
   static std::unique_ptr<ConstraintSolver> make(std::unique_ptr<GroupSolver> device,
                                                 const ConstraintSolverOptions& options);
-  /// The same with a GPU that `make` starts as soon as the expected gain exceeds `start_ms`.
+  /// Creates a solver whose GPU `make` starts as soon as the expected gain exceeds `start_ms`.
   static std::unique_ptr<ConstraintSolver> make(std::function<std::unique_ptr<GroupSolver>()> make,
                                                 double start_ms,
                                                 const ConstraintSolverOptions& options);

@@ -129,7 +129,7 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
 void ContactScan::register_unlisted(std::span<btPersistentManifold* const> manifolds,
                                     std::size_t first_id) {
   if (!any_unlisted_) return;
-  // Manifolds without contacts too: Bullet also writes their bodies back.
+  // Includes manifolds without contacts, because Bullet also writes their bodies back.
   for (btPersistentManifold* manifold : manifolds) {
     for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
       btCollisionObject* unlisted = object_of(object);

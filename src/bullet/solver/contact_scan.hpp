@@ -30,8 +30,8 @@ struct ContactRef {
   btManifoldPoint& get() const { return manifold->getContactPoint(point); }
 };
 
-/// A kinematic body that a contact or joint refers to, but that is not in the list of the group and
-/// therefore has no id yet.
+/// A kinematic body of a contact or joint that is not in the list of the group and therefore has no
+/// id yet.
 struct UnlistedBody {
   btCollisionObject* object;
   int companion;  ///< its previous companion id
@@ -70,8 +70,8 @@ class ContactScan {
   bool any_unlisted_ = false, any_rolling_ = false, any_anisotropic_ = false;
 };
 
-/// Returns the object as a rigid body if Bullet's solver uses its motion, because its mass is
-/// finite or it is kinematic; else null.
+/// Returns the object as a rigid body if Bullet's solver uses its motion (finite mass or
+/// kinematic); otherwise null.
 btRigidBody* moving_body(btCollisionObject* object);
 /// The BodyFlag bits of a body.
 std::uint8_t body_flags(const btRigidBody& body);

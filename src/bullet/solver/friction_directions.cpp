@@ -1,5 +1,5 @@
-/// Friction directions as btSequentialImpulseConstraintSolver::convertContact() of Bullet 3.24
-/// computes them; see the header.
+/// Friction directions of btSequentialImpulseConstraintSolver::convertContact() in Bullet 3.24; see
+/// the header.
 #include "src/bullet/solver/friction_directions.hpp"
 
 #include "src/bullet/solver/rolling_friction_rows.hpp"
@@ -21,7 +21,7 @@ void set_friction_directions(const ContactRef& contact, const rows::RowSettings&
   btManifoldPoint& point = contact.get();
   point.m_lateralFrictionDir1.setValue(one[0], one[lanes], one[2 * lanes]);
   if (second != nullptr) {
-    // Not setValue(): Bullet leaves the fourth component as it was.
+    // Not setValue(): Bullet does not change the fourth component.
     for (std::size_t i = 0; i < 3; ++i) point.m_lateralFrictionDir2.m_floats[i] = second[i * lanes];
   }
   if (contact.anisotropic) {

@@ -21,9 +21,9 @@ namespace bullet {
 namespace {
 
 constexpr std::size_t kContactsPerChunk = 128, kBodiesPerChunk = 256;
-/// Minimum size of a group for the device: the CPU solves smaller groups before a device responds.
+/// Minimum group size for the device: the CPU solves smaller groups before a device responds.
 constexpr std::size_t kMinContacts = 400;
-/// Ratio of predicted times at which a trial of the device costs more than it can save.
+/// Ratio of predicted times above which a trial of the device costs more than it can save.
 constexpr double kMaxSlowdown = 4;
 
 /// Length of the longest chain of dependent steps, per color and iteration; 1.4 to 1.6 in piles.
@@ -32,9 +32,9 @@ constexpr double kSequentialRowsPerColor = 1.5;
 /// Indices of the alternatives of the chooser.
 constexpr std::size_t kCpu = 0, kGpu = 1;
 
-/// Predicted times [us] to solve a group, from measurements on an AMD EPYC of 2022 with AVX2 and on
-/// an NVIDIA H200. The threads share the packing of contacts and the setup of rows; sweeps gain
-/// little from more threads.
+/// Predicted times [us] to solve a group, measured on an AMD EPYC of 2022 with AVX2 and on an
+/// NVIDIA H200. The threads share the packing of contacts and the setup of rows; sweeps gain little
+/// from further threads.
 double cpu_us(double contacts, int iterations, unsigned threads) {
   return 5 + 1e-3 * contacts * (150.0 / threads + 23 * iterations);
 }
@@ -101,7 +101,7 @@ void GpuIslandSolver::start(std::size_t contacts) {
 void GpuIslandSolver::take_started() {
   auto outcome = starter_.take();
   if (!outcome) return;
-  if (outcome->has_failed) return chooser_.reset();  // no usable device: not a failure
+  if (outcome->has_failed) return chooser_.reset();  // a missing device is not a failure
   solver_ = std::move(outcome->device);
   chooser_->wake();
 }
@@ -114,7 +114,7 @@ void GpuIslandSolver::disable(const std::string& why) {
 }
 
 void GpuIslandSolver::finished(std::uint32_t colors) {
-  if (!timed_ || !chooser_) return;  // this group is not timed
+  if (!timed_ || !chooser_) return;  // the time of this group is not measured
   if (colors > 0) colors_per_contact_ = colors / static_cast<double>(timed_contacts_);
   const std::chrono::duration<double, std::micro> us = Clock::now() - since_;
   chooser_->record(us.count(), timed_prediction_us_);
@@ -122,7 +122,7 @@ void GpuIslandSolver::finished(std::uint32_t colors) {
 }
 
 std::optional<rows::RowSweepReport> GpuIslandSolver::solve(const DeviceGroup& group) {
-  // Outside the try block, because a lack of host memory must not disable the device.
+  // Outside the try block: a failed allocation on the host must not disable the device.
   order_.reserve(group.scan.contacts().size(), group.bodies);
   try {
     pack(group);
@@ -137,7 +137,7 @@ std::optional<rows::RowSweepReport> GpuIslandSolver::solve(const DeviceGroup& gr
       }
     }
     return solve_packed(group);
-  } catch (const std::bad_alloc&) {  // memory of the host
+  } catch (const std::bad_alloc&) {  // host memory is exhausted
     throw;
   } catch (const std::exception& error) {
     disable(error.what());
@@ -164,7 +164,7 @@ void GpuIslandSolver::pack(const DeviceGroup& group) {
                 in.factors + first * rows::kFactorFields);
   });
   std::atomic<bool> warm{false};
-  // One thread builds the order in about the time that the others need for the rest.
+  // One thread builds the order in about the time of all other threads for the rest.
   pool.run(1 + (size.contacts + kContactsPerChunk - 1) / kContactsPerChunk, [&](std::size_t i) {
     if (i == 0) {
       order_.build(scan.pairs(), size.bodies, in.schedule, in.slot_contacts, in.contact_counts);
@@ -263,7 +263,7 @@ void GpuIslandSolver::write_back(const DeviceGroup& group, const rows::ContactOu
                                  btManifoldPoint& point) {
   point.m_lateralFrictionDir1.setValue(from.direction[0], from.direction[1], from.direction[2]);
   if (from.has_second != 0) {
-    // Not setValue(): Bullet leaves the fourth component as it was.
+    // Not setValue(): Bullet does not change the fourth component.
     std::copy_n(from.second, 3, point.m_lateralFrictionDir2.m_floats);
   } else if (group.directions == 2) {
     point.m_lateralFrictionDir2.setValue(from.second[0], from.second[1], from.second[2]);

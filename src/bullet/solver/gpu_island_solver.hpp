@@ -39,36 +39,38 @@ struct DeviceGroup {
   std::function<void(const ContactRef&, Real* rows)> set_up_rolling_friction;
 };
 
-/// Solves groups on a device: none (`cpu`), all that the device supports (`cuda`), or those for
-/// which it is expected to be faster (`automatic`).
+/// Solves groups on a device: none (`cpu`), all supported groups (`cuda`), or groups for which the
+/// device is expected to be faster (`automatic`).
 class GpuIslandSolver {
  public:
   static constexpr double kStartMs = 200;  ///< duration of the first use of the device
 
-  /// @param make creates the solver on the device. It is called in the constructor if the backend
-  ///   is cuda. With `automatic` it is called on another thread as soon as the expected gain
-  ///   justifies the start, and the CPU solves all groups until it has returned; the destructor
-  ///   waits for it.
+  /// @param make creates the solver on the device. With `cuda`, it is called in the constructor.
+  /// With
+  ///   `automatic`, it is called on another thread as soon as the expected gain justifies the
+  ///   start;
+  ///   until it has returned, the CPU solves all groups. The destructor waits for it.
   /// @param threads number of threads of the CPU
   /// @param start_ms expected duration of that call of `make`
-  /// @throws BackendUnavailable if the backend is cuda and `make` is null, and all exceptions of
-  ///   that call of `make`
+  /// @throws BackendUnavailable if the backend is cuda and `make` is null; with `cuda`, the
+  /// exceptions
+  ///   of `make`
   GpuIslandSolver(Backend backend, GroupSolverMaker make, unsigned threads,
                   double start_ms = kStartMs);
 
-  /// Chooses the CPU or the device for a group, and starts the clock that finished() stops.
-  /// @return whether the device is to solve the group
+  /// Selects the CPU or the device for a group, and starts the clock that finished() stops.
+  /// @return whether the device should solve the group
   bool choose(const ContactScan& scan, const btContactSolverInfo& info);
   /// Solves a group for which choose() returned true. Only reads Bullet's bodies and points.
   /// @return nothing if the device fails, or is predicted to be much slower
-  /// @throws OutOfMemory, std::bad_alloc if the host has no memory for the group
+  /// @throws OutOfMemory, std::bad_alloc if host memory is insufficient for the group
   std::optional<rows::RowSweepReport> solve(const DeviceGroup& group);
   /// Writes impulses and friction directions of the last group to the contact points.
   void write_back(const DeviceGroup& group) const;
   /// Records the time since choose() as the time of the group.
   /// @param colors number of colors of the contacts, if the CPU has colored them; else 0
   void finished(std::uint32_t colors);
-  /// Stops the clock without a record, because the group was not solved.
+  /// Stops the clock without recording the time, because the group was not solved.
   void abandon() noexcept { timed_ = false; }
 
   /// Why the device is no longer used; empty if it has not failed.

@@ -1,4 +1,4 @@
-/// Setup of the bodies of a group, including those that only joints or manifolds refer to.
+/// Setup of the bodies of a group, including bodies that only joints or manifolds refer to.
 #include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
@@ -32,8 +32,8 @@ void ConstraintSolver::Impl::set_up_bodies() {
   });
 }
 
-/// As Bullet's convertBodies(). A body for which Bullet creates no solver body keeps its index here
-/// and is replaced by the fixed body, which does not change any result.
+/// Equals Bullet's convertBodies(), with one exception. A body for which Bullet creates no solver
+/// body keeps its index and is replaced by the fixed body, which does not change any result.
 void ConstraintSolver::Impl::set_up_body(std::size_t i, btCollisionObject* object) {
   object->setCompanionId(-1);
   btSolverBody& body = self.m_tmpSolverBodyPool[static_cast<int>(i)];
@@ -65,7 +65,7 @@ void ConstraintSolver::Impl::start(const btSolverBody& body, std::size_t id) {
   std::fill_n(solver.push_velocity(id), rows::kVelocityFields, Real(0));
 }
 
-/// Bullet creates the rows of joints. The bodies that Bullet adds for them receive ids here.
+/// Bullet creates the rows of joints. Assigns ids to the bodies that Bullet adds for them.
 void ConstraintSolver::Impl::set_up_joints() {
   btAlignedObjectArray<btSolverBody>& pool = self.m_tmpSolverBodyPool;
   self.m_fixedBodyId = -1;
@@ -76,7 +76,7 @@ void ConstraintSolver::Impl::set_up_joints() {
     }
   }
   self.convertJoints(joints.data(), static_cast<int>(joints.size()), *info);
-  // Joints without rows too: Bullet adds their bodies when it solves the joints.
+  // Includes joints without rows, whose bodies Bullet adds when it solves the joints.
   for (btTypedConstraint* joint : joints) {
     if (!joint->isEnabled()) continue;
     self.getOrInitSolverBody(joint->getRigidBodyA(), settings.dt);
@@ -101,7 +101,7 @@ void ConstraintSolver::Impl::set_up_joints() {
   }
 }
 
-/// Adds the bodies that Bullet adds when it finds them in a manifold.
+/// Adds the bodies that Bullet adds when they first occur in a manifold.
 void ConstraintSolver::Impl::set_up_unlisted_bodies(
     std::span<btPersistentManifold* const> manifolds) {
   const auto next_id = static_cast<std::size_t>(self.m_tmpSolverBodyPool.size()) + 1;

@@ -10,9 +10,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// First of the two alternatives, because the chooser then replaces it only for a clear gain.
+/// First alternative, because the chooser then replaces it only for a clear gain.
 constexpr std::size_t kBullet = 0;
-/// [us] Less than any group takes, so that the chooser measures both alternatives.
+/// [us], shorter than the time of any group, so that the chooser measures both alternatives.
 constexpr double kLowerBoundUsPerManifold = 1e-3;
 
 }  // namespace

@@ -11,8 +11,8 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// One residual per iteration is stored, and reset for each group. More iterations mean that the
-/// user iterates until the threshold is reached; Bullet's solver needs no memory for them.
+/// One residual per iteration is stored and reset for each group. With more iterations, the user
+/// iterates until the threshold is reached; Bullet's solver needs no memory for them.
 constexpr int kMaxIterations = 1 << 16;
 /// SOLVER_SIMD has no effect on Linux; SOLVER_FRICTION_SEPARATE and SOLVER_CACHE_FRIENDLY have no
 /// effect at all.
@@ -20,12 +20,12 @@ constexpr int kUnsupportedModes = SOLVER_RANDMIZE_ORDER | SOLVER_ENABLE_FRICTION
 
 }  // namespace
 
-/// The steps of Bullet's solver that this class does not execute one by one, as the object
-/// currently overrides them.
+/// The steps of Bullet's solver that this class does not execute one by one, with the overrides of
+/// the object's class.
 ///
-/// The functions are read from the virtual table, because typeid cannot replace the comparison: a
-/// subclass that overrides none of these steps must keep the accelerated solver, and the typeid of
-/// a subclass compiled with -fno-rtti is invalid.
+/// The functions are read from the virtual table. typeid cannot replace the comparison: a subclass
+/// that overrides none of these steps must keep the accelerated solver, and the typeid of a
+/// subclass compiled with -fno-rtti is invalid.
 ConstraintSolver::Impl::Steps ConstraintSolver::Impl::steps() const {
   return {virtual_function(&self, &ConstraintSolver::convertContacts),
           virtual_function(&self, &ConstraintSolver::convertBodies),
@@ -82,7 +82,7 @@ std::optional<SolverFallback> ConstraintSolver::Impl::fallback_reason(
   return std::nullopt;
 }
 
-/// Restores the companion ids that Bullet's solver reads.
+/// Restores the companion ids for Bullet's solver.
 SolverFallback ConstraintSolver::Impl::restore(SolverFallback reason) {
   for (const UnlistedBody& body : scan.unlisted()) body.object->setCompanionId(body.companion);
   for (const UnlistedBody& body : joint_unlisted) body.object->setCompanionId(body.companion);

@@ -29,7 +29,7 @@ void apply(cpu::RowSolver& solver, std::int32_t id, const btVector3& axis,
   store(velocity + 4, load(velocity + 4) + response * (impulse * load(factors + 8)));
 }
 
-/// A class compiled with -fno-rtti is not Bullet's.
+/// A class compiled with -fno-rtti is not a class of Bullet.
 bool is_known_joint(const btTypedConstraint& constraint) {
   static const std::type_info* const kKnown[] = {&typeid(btPoint2PointConstraint),
                                                  &typeid(btHingeConstraint),

@@ -12,11 +12,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Whether all joints are of classes that Bullet defines and that act only through their rows.
+/// Whether all joints are of classes that Bullet defines and act only through their rows.
 bool are_known_joints(std::span<btTypedConstraint* const> joints);
 
-/// Solves the rows that btSequentialImpulseConstraintSolver::convertJoints() creates, and stores
-/// the impulses in them.
+/// Solves the rows of btSequentialImpulseConstraintSolver::convertJoints(), and stores the impulses
+/// in them.
 class JointRows final : public cpu::SerialRows {
  public:
   /// @param ids by solver body: the id, or its complement for a body that rows do not move

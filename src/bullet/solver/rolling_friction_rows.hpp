@@ -1,5 +1,5 @@
 /// Rolling and spinning friction rows of a contact. Bullet's own function sets them up, because
-/// they are usually few.
+/// there are usually few.
 #pragma once
 
 #include "src/bullet/solver/contact_scan.hpp"
@@ -14,7 +14,7 @@ namespace bullet {
 /// @param mode one of btCollisionObject::AnisotropicFrictionFlags
 void apply_anisotropic_friction(const ContactRef& contact, btVector3* axis, int mode);
 
-/// Sets up those of the kRollingFrictionRows rows of a contact that are not 0. Thread-safe for
+/// Sets up the nonzero rows among the kRollingFrictionRows rows of a contact. Thread-safe for
 /// different contacts.
 /// @param fixed index of the solver body that replaces all bodies without a solver body
 /// @param to    the lane of the contact in its rows, which are all 0

@@ -14,7 +14,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 rows::RowSettings row_settings(const btContactSolverInfo& info);
-/// Adds gyroscopic impulses as btSequentialImpulseConstraintSolver::convertBodies() does. The body
+/// Adds gyroscopic impulses like btSequentialImpulseConstraintSolver::convertBodies(). The body
 /// must have an original body.
 void add_gyroscopic_impulses(const btContactSolverInfo& info, btSolverBody* body);
 /// Writes the kBodyFields numbers that gather_body() reads. The body must have an original body.

@@ -45,8 +45,8 @@ struct ContactCheck::Impl {
                        std::uint64_t step);
 };
 
-/// Reads the pair cache instead of the dispatcher's array, which also has the predictive contacts
-/// of continuous collision, whose spheres do not touch.
+/// Reads the pair cache, not the dispatcher's array, which also contains the predictive contacts of
+/// continuous collision, whose spheres do not touch.
 std::vector<BulletPoint> ContactCheck::Impl::points_of(btDynamicsWorld& world) const {
   const auto by_proxy = [](const btCollisionObject* body, const btBroadphaseProxy* proxy) {
     return body->getBroadphaseHandle()->getUid() < proxy->getUid();
@@ -138,8 +138,8 @@ void ContactCheck::capture(const btDynamicsWorld& world) {
       impl.bodies.push_back(all[i]);
     }
   }
-  // Bullet puts the body with the lower proxy id first; the same order here gives normals the same
-  // direction.
+  // Bullet puts the body with the lower proxy id first; the same order yields the same direction of
+  // normals.
   std::sort(impl.bodies.begin(), impl.bodies.end(), [](const auto* a, const auto* b) {
     return a->getBroadphaseHandle()->getUid() < b->getBroadphaseHandle()->getUid();
   });

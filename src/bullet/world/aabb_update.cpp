@@ -64,7 +64,7 @@ void prefetch_body(btCollisionObjectArray& objects, int i) {
   }
 }
 
-/// Prefetches what apply_update() changes.
+/// Prefetches the data that apply_update() changes.
 void prefetch_leaf(std::span<const LeafUpdate> leaves, std::size_t i) {
   constexpr std::size_t kAhead = 4;
   if (i + 3 * kAhead < leaves.size()) {
@@ -93,9 +93,9 @@ bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   const int leaves = tree.m_sets[0].m_leaves + tree.m_sets[1].m_leaves;
   if (!reserve_geometric(static_cast<std::size_t>(leaves))) return false;
 
-  // Leaves that belong to no object of the world are not among the updates.
+  // Leaves without an object of the world are not among the updates.
   if (leaves >= minimum_objects_ && leaves == world.getNumCollisionObjects()) {
-    BT_PROFILE("updateAabbs");  // Bullet's own name of the profile zone
+    BT_PROFILE("updateAabbs");  // Bullet's name of the profile zone
     if (compute_updates(world, tree, pool)) {
       if (few_leaves_move(pool)) {
         run_in_tree(tree, cache);
@@ -111,7 +111,7 @@ bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   return true;
 }
 
-/// Returns false if an object must be updated by Bullet's code.
+/// Returns false if Bullet's code must update an object.
 bool AabbUpdate::compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree,
                                  ThreadPool& pool) {
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
@@ -130,7 +130,7 @@ bool AabbUpdate::compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree
   return possible;
 }
 
-/// Whether the search of each moving leaf in Bullet's tree takes less time than a search for all
+/// Whether searching Bullet's tree for each moving leaf takes less time than a search for all
 /// leaves, which sorts them.
 bool AabbUpdate::few_leaves_move(const ThreadPool& pool) const {
   constexpr std::size_t kTimeOfSearch = 16;  // in units of the time to sort a leaf
@@ -139,7 +139,7 @@ bool AabbUpdate::few_leaves_move(const ThreadPool& pool) const {
   return static_cast<std::size_t>(moving) * kTimeOfSearch * pool.threads() < leaves_.size();
 }
 
-/// Moves the leaves, and searches Bullet's tree for the overlaps of each.
+/// Moves the leaves, and searches Bullet's tree for the overlaps of each moving leaf.
 void AabbUpdate::run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache) {
   for (std::size_t i = 0; i < leaves_.size(); ++i) {
     prefetch_leaf(leaves_, i);
@@ -149,7 +149,7 @@ void AabbUpdate::run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCach
   }
 }
 
-/// Returns false and changes nothing if there is not enough memory.
+/// Returns false, without a change, if there is not enough memory.
 bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
                                  ThreadPool& pool) {
   std::size_t overlaps = 0;
@@ -173,7 +173,7 @@ bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPair
       }
       try {
         move_leaves(tree);
-      } catch (...) {  // of the user's allocator
+      } catch (...) {  // thrown by the user's allocator
         failed_.store(true, std::memory_order_release);
         throw;
       }
@@ -185,16 +185,16 @@ bool AabbUpdate::run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPair
   return true;
 }
 
-/// Whether there are new pairs that can be added on another thread: the user's allocator need not
-/// be thread-safe.
+/// Whether new pairs exist and can be added on another thread: the user's allocator need not be
+/// thread-safe.
 bool AabbUpdate::adds_without_allocation(btHashedOverlappingPairCache& cache) const {
   const btBroadphasePairArray& pairs = cache.getOverlappingPairArray();
   const auto room = static_cast<std::size_t>(pairs.capacity() - pairs.size());
   return !new_pairs_.empty() && new_pairs_.size() < room && cache.*PairTables::ghosts == nullptr;
 }
 
-/// Moves the leaves, one after the other, and puts the new pairs of each in the order in which
-/// Bullet finds them: fixed objects first, then by position in the tree.
+/// Moves the leaves one after the other, and sorts the new pairs of each leaf into Bullet's order:
+/// fixed objects first, then by position in the tree.
 void AabbUpdate::move_leaves(btDbvtBroadphase& tree) {
   const auto is_fixed = [](const NewPair& pair) {
     return pair.other->stage == btDbvtBroadphase::STAGECOUNT;
@@ -222,7 +222,7 @@ void AabbUpdate::move_leaves(btDbvtBroadphase& tree) {
   }
 }
 
-/// Adds the new pairs as move_leaves() orders them, which may run at the same time.
+/// Adds the new pairs in the order of move_leaves(), which may run at the same time.
 void AabbUpdate::add_new_pairs(btHashedOverlappingPairCache& cache) {
   Backoff backoff(true);
   for (std::size_t next = 0; next < new_pairs_.size();) {
@@ -264,7 +264,7 @@ void AabbUpdate::search_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCach
 }
 
 /// `leaves` elements suffice: no leaf is found twice, and no node in the stack is an ancestor of
-/// another.
+/// another node.
 bool AabbUpdate::reserve_geometric(std::size_t leaves) noexcept {
   try {
     jfpx::reserve_geometric(&stack_, leaves);
@@ -323,7 +323,7 @@ void AabbUpdate::add_pairs(btHashedOverlappingPairCache& cache) {
     prefetch(&next[pair.index]);
   }
   for (const Pair& pair : pairs_) {
-    // Added pairs may move others to a different list; Bullet's own search handles those.
+    // Added pairs may move other pairs to a different list; Bullet's own search handles those.
     int index = pair.index;
     while (index != BT_NULL_PAIR &&
            (known[index].m_pProxy0 != pair.a || known[index].m_pProxy1 != pair.b)) {

@@ -18,20 +18,20 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// In large worlds, most of the update is the search for overlaps, and most of that is looking up
-/// pairs that are already in the hash table. Only the shape of the tree depends on the order of the
-/// objects. New volumes, overlaps and new pairs are therefore computed in parallel; then the leaves
-/// are moved one after the other, and the new pairs of each are added in the order in which Bullet
-/// would find them.
+/// In large worlds, most time of the update is spent in the search for overlaps, and most of that
+/// in looking up pairs that are already in the hash table. Only the shape of the tree depends on
+/// the order of the objects. New volumes, overlaps and new pairs are therefore computed in
+/// parallel. Then the leaves are moved one after the other, and the new pairs of each leaf are
+/// added in Bullet's order.
 class JFPX_API AabbUpdate {
  public:
-  /// @param minimum_objects fewer objects are updated one after the other, which is then faster
+  /// @param minimum_objects fewer objects are updated serially, which is then faster
   explicit AabbUpdate(int minimum_objects = 256) : minimum_objects_(minimum_objects) {}
 
-  /// Has the effect of btCollisionWorld::updateAabbs(). Returns false and changes nothing if the
-  /// broadphase is not Bullet's default, its own tree with its own hash table, if user code may run
-  /// during the update (a pair filter, ghosts or shapes of a user class, a debug drawer in a small
-  /// world or with an AABB that is too large), or if there is not enough memory.
+  /// Has the effect of btCollisionWorld::updateAabbs(). Returns false, without a change, if the
+  /// broadphase is not Bullet's default (its own tree with its own hash table), if user code may
+  /// run during the update (a pair filter, ghosts or shapes of a user class, a debug drawer in a
+  /// small world or with an AABB that is too large), or if there is not enough memory.
   bool run(btCollisionWorld& world, ThreadPool& pool);
 
  private:
@@ -64,9 +64,9 @@ class JFPX_API AabbUpdate {
   int minimum_objects_;
   std::vector<LeafUpdate> leaves_;
   OverlapSearch search_;
-  std::vector<NewPair> new_pairs_;  ///< in Bullet's order, as far as `ordered_`
+  std::vector<NewPair> new_pairs_;  ///< in Bullet's order, up to `ordered_`
   std::atomic<std::size_t> ordered_{0};
-  std::atomic<bool> failed_{false};  ///< whether the moves have ended with an exception
+  std::atomic<bool> failed_{false};  ///< whether moving the leaves has thrown an exception
   std::vector<const btDbvtNode*> stack_;
   std::vector<Pair> pairs_;
 };

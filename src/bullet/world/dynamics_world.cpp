@@ -23,7 +23,7 @@ namespace bullet {
 namespace {
 
 constexpr std::size_t kBodiesPerChunk = 64;
-/// Number of bodies from which several threads move them; waking threads takes longer than fewer.
+/// Minimum number of bodies for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedBodies = 2048;
 
 int island_of(const btTypedConstraint* constraint) {
@@ -32,7 +32,7 @@ int island_of(const btTypedConstraint* constraint) {
 }
 bool is_movable(const btCollisionObject& object) { return !object.isStaticOrKinematicObject(); }
 
-/// As btDiscreteDynamicsWorld::updateActivationState().
+/// Equals btDiscreteDynamicsWorld::updateActivationState().
 void update_activation(btRigidBody& body, btScalar dt) {
   body.updateDeactivation(dt);
   if (!body.wantsSleeping()) {
@@ -60,7 +60,7 @@ struct DynamicsWorld::Impl {
   explicit Impl(const DynamicsWorldOptions& options)
       : pool(options.threads), islands(pool), minimum_batch(options.minimum_batch) {}
 
-  /// Calls run(bodies, count) for all chunks of the array, of many bodies in parallel.
+  /// Calls run(bodies, count) for all chunks of the array; in parallel for many bodies.
   template <class Run>
   void in_body_chunks(btAlignedObjectArray<btRigidBody*>& bodies, const Run& run) {
     const auto count = static_cast<std::size_t>(bodies.size());
@@ -122,7 +122,7 @@ void DynamicsWorld::clearForces() {
   });
 }
 
-// A motion state may be of the user's class.
+// A motion state may have a user-defined class.
 void DynamicsWorld::synchronizeMotionStates() {
   if (is_small() || m_synchronizeAllMotionStates ||
       impl_->any_body(m_nonStaticRigidBodies, [](const btRigidBody* body) {
@@ -192,7 +192,7 @@ void DynamicsWorld::computeOverlappingPairs() {
   }
 }
 
-// Bullet's functions do nothing to the broadphase for an object without a proxy.
+// For an object without a proxy, Bullet's functions have no effect on the broadphase.
 void DynamicsWorld::removeCollisionObject(btCollisionObject* object) {
   if (!is_small()) impl_->removal.run(*this, *object, impl_->pool);
   btDiscreteDynamicsWorld::removeCollisionObject(object);

@@ -1,5 +1,5 @@
-/// Reproduces btSimulationIslandManager.cpp, and the island callback of
-/// btDiscreteDynamicsWorld.cpp, of Bullet 3.24 step by step.
+/// Reproduces btSimulationIslandManager.cpp and the island callback of btDiscreteDynamicsWorld.cpp
+/// of Bullet 3.24, step by step.
 #include "src/bullet/world/islands.hpp"
 
 #include <jfpx/error.hpp>
@@ -27,16 +27,16 @@ namespace {
 
 constexpr std::size_t kIslandManifoldsPerChunk = 512, kIslandPairsPerChunk = 512;
 constexpr std::size_t kObjectsPerChunk = 1024;
-/// Numbers from which several threads process them; waking threads takes longer than fewer.
+/// Minimum numbers for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedIslandManifolds = 4096, kSharedIslandPairs = 4096;
 
-/// As btUnionFind::find(), without compressing paths, so that threads may search concurrently.
+/// btUnionFind::find() without path compression, so that threads may search concurrently.
 int root_of(const btUnionFind& unions, int x) {
   while (x != unions.getElement(x).m_id) x = unions.getElement(x).m_id;
   return x;
 }
 
-/// Shortens the paths of the next searches to one step.
+/// Compresses the paths of later searches to one step.
 void point_to_roots(btUnionFind* unions) {
   for (int i = 0; i < unions->getNumElements(); ++i) unions->getElement(i).m_id = unions->find(i);
 }
@@ -57,7 +57,7 @@ int island_of(const btTypedConstraint& constraint) {
   return island_of(constraint.getRigidBodyA(), constraint.getRigidBodyB());
 }
 
-/// Moving kinematic objects wake the objects that they overlap.
+/// Wakes the objects that a moving kinematic object overlaps.
 void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
   if (kinematic.isKinematicObject() && kinematic.getActivationState() != ISLAND_SLEEPING &&
       kinematic.hasContactResponse()) {
@@ -66,7 +66,7 @@ void wake(const btCollisionObject& kinematic, const btCollisionObject& other) {
 }
 
 /// Whether the manifold belongs to the islands to solve. Sets `kinematic` if the result may depend
-/// on objects that kinematic objects have woken.
+/// on objects woken by kinematic objects.
 bool needs_solving(btDispatcher& dispatcher, const btPersistentManifold& manifold,
                    bool only_touching, bool* kinematic) {
   if (only_touching && manifold.getNumContacts() == 0) return false;
@@ -96,7 +96,7 @@ void for_each_union(std::span<const btBroadphasePair> pairs, const Unite& unite)
   }
 }
 
-/// Whether a kinematic object, or a dispatcher of the user, may wake objects of sleeping islands.
+/// Whether a kinematic object, or a user-defined dispatcher, may wake objects of sleeping islands.
 bool may_be_woken(btCollisionWorld& world) {
   if (!is_plain(*world.getDispatcher())) return true;
   const btCollisionObjectArray& objects = world.getCollisionObjectArray();
@@ -139,8 +139,8 @@ void IslandSolver::number_and_unite(btCollisionWorld& world, btUnionFind* unions
   const auto count = static_cast<std::size_t>(cache->getNumOverlappingPairs());
   if (count == 0) return;
   const std::span pairs(cache->getOverlappingPairArrayPtr(), count);
-  // The first pairs unite most objects, so most of the others connect objects of one set. Threads
-  // discard those.
+  // The first pairs unite most objects, so most of the remaining pairs connect objects of one set.
+  // Threads discard these pairs.
   const auto objects = static_cast<std::size_t>(numbers_.back());
   std::size_t first = std::min(count, 2 * objects);
   if (pool_.threads() == 1 || count - first < kSharedIslandPairs) first = count;
@@ -190,8 +190,8 @@ void IslandSolver::number_objects(btCollisionObjectArray& objects) {
   });
 }
 
-/// Lists the pairs of objects in different sets, in order. Reads the sets, and leaves the results
-/// of find() unchanged. @return their number
+/// Lists the pairs of objects in different sets, in order. Reads the sets without changing the
+/// results of find(). @return the number of pairs
 int IslandSolver::find_edges(std::span<const btBroadphasePair> pairs, const btUnionFind& unions) {
   const std::size_t count = pairs.size(), chunks = chunks_of(count, kIslandPairsPerChunk);
   in_chunks(pool_, count, kIslandPairsPerChunk, [&](std::size_t first, std::size_t last) {
@@ -363,8 +363,8 @@ bool IslandSolver::collect_in_parallel(btDispatcher& dispatcher, bool only_touch
   return true;
 }
 
-/// Bullet's sort is not stable, so the order is reproduced by the same sort on keys that compare
-/// identically.
+/// Bullet's sort is not stable. Sorting keys that compare identically with the same algorithm
+/// reproduces the order.
 void IslandSolver::sort_manifolds(bool by_pair) {
   keys_.resizeNoInitialize(count_);
   if (!by_pair) {
@@ -421,7 +421,7 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
                       world.getDispatcher());
     begin_group();
   };
-  begin_group();  // discards pointers that a solver's exception has left, which may dangle
+  begin_group();  // discards dangling pointers after an exception of a solver
   int key = 0, joint = 0;
   for (int first = 0, last = 0; first < unions.getNumElements(); first = last) {
     const int island = unions.getElement(first).m_id;

@@ -1,5 +1,5 @@
 /// Equivalent of Bullet's island manager with the same results in the same order. It reads each
-/// object and manifold once, where Bullet reads them in every comparison of a sort.
+/// object and manifold once; Bullet reads them in every comparison of a sort.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -27,15 +27,15 @@ class IslandSolver {
   explicit IslandSolver(ThreadPool& pool, std::size_t pairs_per_round = std::size_t{1} << 17)
       : pool_(pool), pairs_per_round_(pairs_per_round) {}
 
-  /// Reserves all memory that the next two functions need. @returns false if an allocation fails
+  /// Reserves all memory for the next two functions. @returns false if an allocation fails
   bool reserve_for_unions(btCollisionWorld& world) noexcept;
   /// btSimulationIslandManager::updateActivationState(): numbers the movable objects, and unites
-  /// those whose AABBs overlap.
+  /// objects whose AABBs overlap.
   void number_and_unite(btCollisionWorld& world, btUnionFind* unions);
   /// btSimulationIslandManager::storeIslandActivationState(): writes island tags to the objects.
   void store_islands(btCollisionWorld& world, btUnionFind* unions);
 
-  /// Reserves all memory that solve() needs. @returns false if an allocation fails
+  /// Reserves all memory for solve(). @returns false if an allocation fails
   bool reserve_geometric(btCollisionWorld& world, int constraint_count) noexcept;
   /// @param constraints sorted by island
   void solve(btCollisionWorld& world, btUnionFind& unions, btConstraintSolver& solver,

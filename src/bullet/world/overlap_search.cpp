@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kLeavesPerChunk = 512;
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
-/// Leaves from which the order of the tree, which affects only the speed, is derived.
+/// Number of sampled leaves that determine the order of the tree, which affects only the speed.
 constexpr std::size_t kSample = 256;
 
 Aabb aabb_of(const btDbvtVolume& volume) {
@@ -85,7 +85,7 @@ bool OverlapSearch::overlap(const Box& a, const Box& b) {
   return result;
 }
 
-// With intrinsics, because compilers do not vectorize a loop that makes a bit mask.
+// With intrinsics, because compilers do not vectorize a loop that computes a bit mask.
 unsigned OverlapSearch::test(const Block& block, const Box& box) {
   using namespace cpu;
   unsigned mask = 0;
@@ -183,8 +183,8 @@ void OverlapSearch::pack(ThreadPool& pool, std::span<const LeafUpdate> leaves) {
   }
 }
 
-/// Searches for the moving leaves of some blocks. The leaves of a block are neighbours, so the tree
-/// is searched once for all of them.
+/// Searches for the moving leaves of some blocks. The leaves of a block are neighbours, so one
+/// search of the tree serves all of them.
 void OverlapSearch::search(std::size_t first_block, std::size_t last_block, const PairTable& table,
                            Chunk* chunk) {
   chunk->found.clear();
@@ -253,15 +253,15 @@ void OverlapSearch::add_hit(const Leaf& moving, const Leaf& other, Chunk* chunk)
   const bool earlier = other.index < moving.index;
   if (!overlap(earlier ? other.after : other.before, moving.after)) return;
   ++chunk->overlaps;
-  // At its own turn, the other leaf has found this pair already.
+  // The other leaf has already found this pair at its own turn.
   if (earlier && other.moves && overlap(moving.before, other.after)) return;
   const bool swapped = other.id < moving.id;
   const Leaf &a = swapped ? other : moving, &b = swapped ? moving : other;
   chunk->hits.push_back({moving.index, swapped, a.proxy, b.proxy, nullptr, a.id, b.id, 0});
 }
 
-/// Keeps the hits that are not in the pair cache. Three passes, so that the cache misses of
-/// different pairs overlap.
+/// Keeps the hits that are not in the pair cache. Three passes overlap the cache misses of
+/// different pairs.
 void OverlapSearch::look_up(const PairTable& table, Chunk* chunk) {
   for (Hit& hit : chunk->hits) {
     const unsigned at = pair_hash(hit.id_a, hit.id_b) & table.mask;

@@ -22,13 +22,12 @@ struct NewOverlap {
   btDbvtProxy* other;
 };
 
-/// At the turn of leaf i, the leaves before i have their new volumes, all others their old ones.
-/// Hence the leaves that i overlaps do not depend on the tree, and all turns are searched in
-/// parallel.
+/// At the turn of leaf i, the leaves before i have their new volumes, all others their old volumes.
+/// Hence the overlaps of leaf i do not depend on the tree, and all turns are searched in parallel.
 ///
-/// The leaves are sorted along a Morton curve and packed into blocks of eight, and these into
-/// blocks of eight, and so on, as in QueryTree. The volumes of a block contain the old and the new
-/// volumes of its leaves.
+/// The leaves are sorted along a Morton curve and packed into blocks of eight, which are packed
+/// into blocks of eight, and so on, as in QueryTree. The volumes of a block contain the old and the
+/// new volumes of its leaves.
 class OverlapSearch {
  public:
   /// @return the number of overlaps, including those of known pairs
@@ -113,8 +112,8 @@ class OverlapSearch {
   std::vector<NewOverlap> found_;
 };
 
-/// Copy of the private hash function of btHashedOverlappingPairCache. If it differed, the results
-/// would be the same, but Bullet would search for every pair.
+/// Copy of the private hash function of btHashedOverlappingPairCache. A different function would
+/// give the same results, but Bullet would search for every pair.
 inline unsigned pair_hash(int id0, int id1) {
   unsigned key = static_cast<unsigned>(id0) | (static_cast<unsigned>(id1) << 16);
   key += ~(key << 15);

@@ -21,7 +21,7 @@ namespace bullet {
 namespace {
 
 constexpr std::size_t kCleanupPairsPerChunk = 2048;
-/// Number of pairs from which several threads test them; waking threads takes longer than fewer.
+/// Minimum number of pairs for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedCleanupPairs = 8192;
 
 bool is_apart(const btBroadphasePair& pair) {
@@ -44,7 +44,7 @@ void prefetch_volumes(const btBroadphasePairArray& pairs, int i) {
   }
 }
 
-/// Prefetches what removals of pairs read. Pairs to remove are few and far apart, so that every
+/// Prefetches the data for removals of pairs. Pairs to remove are few and far apart, so every
 /// removal would wait for memory.
 class RemovalPrefetch {
  public:
@@ -74,7 +74,7 @@ class RemovalPrefetch {
     if (manifolds_.size() > 0) prefetch_header(manifolds_[0]);
   }
 
-  /// The last pairs and manifolds take the places of removed ones.
+  /// Prefetches the last pairs and manifolds, which replace removed ones.
   void last() const {
     constexpr int kLast = 4;
     if (pairs_.size() > kLast) early(pairs_.size() - kLast);
@@ -130,7 +130,7 @@ bool PairCleanup::run(btCollisionWorld& world, ThreadPool& pool) {
     return false;
   }
 
-  BT_PROFILE("calculateOverlappingPairs");  // Bullet's own name of the profile zone
+  BT_PROFILE("calculateOverlappingPairs");  // Bullet's name of the profile zone
   collide_without_cleanup(tree, dispatcher);
   if (!test_pairs(cache.getOverlappingPairArray(), tree.m_cid % size, count, pool)) {
     tree.m_cid = (tree.m_cid + count) % size;
@@ -163,8 +163,7 @@ bool PairCleanup::test_pairs(const btBroadphasePairArray& pairs, int first, int 
   return any;
 }
 
-/// Removes pairs in Bullet's order. The last pair takes the place of a removed one and is tested
-/// next.
+/// Removes pairs in Bullet's order. The last pair replaces a removed pair and is tested next.
 /// @return the number of pairs that were tested and kept
 int PairCleanup::remove_pairs(btDbvtBroadphase& tree, btDispatcher* dispatcher, int count) {
   const btBroadphasePairArray& pairs = tree.m_paircache->getOverlappingPairArray();

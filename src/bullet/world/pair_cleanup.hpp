@@ -15,16 +15,17 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// In every step with changes, Bullet tests a part of the pairs, often all of them. The tests do
-/// not depend on each other and run in parallel; the removals follow one after the other.
+/// In every step with changes, Bullet tests some or all pairs. The tests are independent and run in
+/// parallel; the removals run serially.
 class JFPX_API PairCleanup {
  public:
   /// @param minimum_pairs with fewer pairs to test, Bullet's own code runs
   explicit PairCleanup(int minimum_pairs = 4096) : minimum_pairs_(minimum_pairs) {}
 
-  /// Has the effect of btCollisionWorld::computeOverlappingPairs(). Returns false and changes
-  /// nothing if Bullet must do so: for another broadphase, pair cache or dispatcher, if user code
-  /// may run during a removal, if there are few pairs to test, or without enough memory.
+  /// Has the effect of btCollisionWorld::computeOverlappingPairs(). Returns false, without a
+  /// change, for another broadphase, pair cache or dispatcher, if user code may run during a
+  /// removal, if there are few pairs to test, or without enough memory; Bullet must then remove the
+  /// pairs.
   bool run(btCollisionWorld& world, ThreadPool& pool);
 
  private:

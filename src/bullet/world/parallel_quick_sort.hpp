@@ -15,7 +15,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// Bullet's sort is not stable, so the order of equal items depends on its steps. The two parts of
-/// a partition do not depend on each other: they are sorted in parallel.
+/// a partition are independent and sorted in parallel.
 template <class T, class Less>
 class ParallelQuickSort {
  public:
@@ -30,7 +30,7 @@ class ParallelQuickSort {
     }
     std::array<Part, kMaxParts> parts{Part{0, items.size() - 1}}, halves;
     std::size_t count = 1;
-    // Each round halves the parts, so its time is that of the largest part.
+    // Each round halves the parts; its time is that of the largest part.
     if (pool.threads() > 1 && items.size() >= kSerial) {
       while (count > 0 && count < 4 * pool.threads() && 2 * count <= kMaxParts) {
         pool.run(count, [&](std::size_t i) {
@@ -91,8 +91,8 @@ class ParallelQuickSort {
       return !less_(item, items[0]) && !less_(items[0], item);
     });
   }
-  /// The permutation of equal items. The partition of a range reverses it, except for the item in
-  /// the middle, and the partitions of its halves reverse these back. Both rounds together exchange
+  /// The permutation of equal items. The partition of a range reverses it, except for the middle
+  /// item, and the partitions of the halves reverse each half again. Both rounds together exchange
   /// the halves.
   static void permute_equal(std::span<T> items) {
     const std::size_t half = items.size() / 2, quarter = half / 2;

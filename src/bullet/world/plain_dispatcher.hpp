@@ -9,7 +9,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// False for a class of the user, which may override access to the manifolds, and whose overrides
+/// False for a user-defined class, which may override access to the manifolds, and whose overrides
 /// need not be thread-safe.
 inline bool is_plain(const btDispatcher& dispatcher) {
   return is_exactly<btCollisionDispatcher>(dispatcher) ||

@@ -1,4 +1,4 @@
-/// Tests whether the ghost objects of a world run no code of the user when pairs come and go.
+/// Tests whether additions and removals of pairs run user code of the ghost objects of a world.
 #pragma once
 
 #include "src/bullet/exact_class.hpp"
@@ -11,19 +11,19 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Ghost objects of a user's class, and user callbacks in the pair cache of a ghost, may change the
-/// world.
+/// Ghost objects of a user-defined class, and user-defined callbacks in the pair cache of a ghost,
+/// may change the world.
 inline bool is_plain_ghost(const btCollisionObject& object) {
   if (is_exactly<btGhostObject>(object)) return true;
   if (!is_exactly<btPairCachingGhostObject>(object)) return false;
   const auto& ghost = static_cast<const btPairCachingGhostObject&>(object);
-  // Only the getter for mutable objects exists.
+  // The getter exists only for mutable objects.
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast)
   auto& cache = *const_cast<btPairCachingGhostObject&>(ghost).getOverlappingPairCache();
   return cache.*PairTables::ghosts == nullptr && cache.getOverlapFilterCallback() == nullptr;
 }
 
-/// True if no ghost pair callback is set, or if it is Bullet's and so are all ghost objects.
+/// True if the ghost pair callback, if any, and all ghost objects are classes of Bullet.
 inline bool has_plain_ghosts(btCollisionWorld& world, btHashedOverlappingPairCache& cache) {
   const btOverlappingPairCallback* callback = cache.*PairTables::ghosts;
   if (callback == nullptr) return true;

@@ -20,7 +20,7 @@ namespace bullet {
 namespace {
 
 constexpr std::size_t kRemovedPairsPerChunk = 8192;
-/// Number of pairs from which several threads search them; waking threads takes longer than fewer.
+/// Minimum number of pairs for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedRemovedPairs = 65536;
 
 }  // namespace
@@ -89,8 +89,8 @@ void ProxyRemoval::find_pairs(const btBroadphasePairArray& pairs, int first, int
   }
 }
 
-/// Removes the pairs that were found. In Bullet's order, the last pair takes the place of a removed
-/// one, and is the next to be tested.
+/// Removes the found pairs. In Bullet's order, the last pair replaces a removed pair and is tested
+/// next.
 void ProxyRemoval::remove_pairs(btHashedOverlappingPairCache& cache, btDispatcher* dispatcher) {
   btBroadphasePairArray& pairs = cache.getOverlappingPairArray();
   std::span<const int> left = found_;

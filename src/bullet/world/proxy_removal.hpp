@@ -14,14 +14,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-/// Bullet visits all pairs of the pair cache twice to remove one object. Here, they are searched
+/// To remove one object, Bullet visits all pairs of the pair cache twice. This class searches them
 /// once, in parallel.
 class JFPX_API ProxyRemoval {
  public:
   /// Has the effect of btCollisionWorld::removeCollisionObject() on the broadphase, the pair cache
-  /// and the handle of the object. Returns false and changes nothing if Bullet must do so: for an
-  /// object without a proxy, for another broadphase, pair cache or dispatcher, if user code may run
-  /// during a removal, or without enough memory.
+  /// and the handle of the object. Returns false, without a change, for an object without a proxy,
+  /// for another broadphase, pair cache or dispatcher, if user code may run during a removal, or
+  /// without enough memory; Bullet must then remove the object.
   bool run(btCollisionWorld& world, btCollisionObject& object, ThreadPool& pool);
 
  private:

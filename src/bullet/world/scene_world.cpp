@@ -73,7 +73,7 @@ class ShapeStore {
     shapes_.emplace_back(new btStaticPlaneShape(to_bullet(plane.normal), plane.offset));
     return shapes_.back().get();
   }
-  /// require_bullet() refuses planes.
+  /// Unreachable, because require_bullet() rejects planes.
   btCollisionShape* make(const Plane&, const btTransform&) { return nullptr; }
 
   btCollisionShape* make(const Compound& compound, const btTransform& axes) {
@@ -122,8 +122,8 @@ void require_bullet(const MaterialSettings& materials) {
   }
 }
 
-/// Bullet stores moments of inertia about the axes of the shape, to which only a compound can be
-/// rotated, and has no two-sided plane.
+/// Bullet has no two-sided plane, and stores moments of inertia about the axes of the shape. Only a
+/// compound can be rotated to its principal axes.
 void require_bullet(const BodyDef& def, std::size_t body) {
   const auto refuse = [body](const char* what) {
     throw InvalidScene("body " + std::to_string(body) + ": " + what);
@@ -147,8 +147,8 @@ PrincipalInertia inertia_of(const BodyDef& def) {
                                        : mass_properties(*compound, def.mass).inertia);
 }
 
-/// The moments of inertia of a solid. Bullet's are exact for spheres and boxes; those of other
-/// shapes are of a box around them.
+/// The moments of inertia of a solid. Bullet's moments are exact for spheres and boxes; for other
+/// shapes they are those of an enclosing box.
 btVector3 inertia_of(const BodyDef& def, const btCollisionShape* shape) {
   if (std::holds_alternative<Sphere>(def.shape) || std::holds_alternative<Box>(def.shape)) {
     btVector3 inertia(0, 0, 0);
@@ -226,8 +226,8 @@ std::unique_ptr<btDiscreteDynamicsWorld> make_world(btCollisionDispatcher* dispa
 
 }  // namespace
 
-/// Members are in the order in which Bullet requires their construction, and are destroyed in
-/// reverse.
+/// Members are in the order of construction that Bullet requires, and are destroyed in reverse
+/// order.
 struct SceneWorld::Impl {
   Scene scene;
   ShapeStore shapes;
@@ -284,7 +284,8 @@ struct SceneWorld::Impl {
     if (!filtered) return world->addRigidBody(body);
     world->addRigidBody(body, static_cast<int>(filter.category), static_cast<int>(filter.mask));
   }
-  /// Moves them as the native engine does; Bullet derives their velocities from the displacement.
+  /// Moves kinematic bodies like the native engine; Bullet derives velocities from the
+  /// displacement.
   void move_kinematic_bodies(Real dt) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const BodyDef& def = scene.bodies[i];
@@ -297,8 +298,8 @@ struct SceneWorld::Impl {
     }
   }
   ~Impl() {
-    // Bullet scans all pairs for every body that is removed from a world; removing the pairs first
-    // avoids the scans.
+    // For every removed body, Bullet scans all pairs of the world. Removing the pairs first avoids
+    // the scans.
     btOverlappingPairCache* cache = broadphase.getOverlappingPairCache();
     while (cache->getNumOverlappingPairs() > 0) {
       const btBroadphasePair& last =
@@ -328,7 +329,7 @@ void SceneWorld::step(Real dt) {
                           " s; it must be finite and larger than the machine epsilon");
   }
   impl_->move_kinematic_bodies(dt);
-  // Without substeps, Bullet makes one step of the full length and keeps no remainder.
+  // Without substeps, Bullet performs one step of the full length and keeps no remainder.
   impl_->world->stepSimulation(dt, 0, dt);
 }
 void SceneWorld::step() { step(impl_->scene.dt); }

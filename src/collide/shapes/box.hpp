@@ -29,7 +29,8 @@ JFPX_HD constexpr Vec3 moments_of_inertia(const Box& box, Real mass) {
 }
 
 inline Real outer_radius(const Box& box) { return length(box.half_extents); }
-/// Exceeds the rounding errors of the pair tests, so that bounds never exclude a contact.
+/// Enlarged by more than the rounding errors of the pair tests, so that bounds never exclude a
+/// contact.
 inline Real bounding_radius(const Box& box) {
   constexpr Real kUnderflowLimit = Real(1e-15);  // below it, squares of floats are inexact or 0
   const Vec3& h = box.half_extents;
@@ -47,8 +48,8 @@ JFPX_HD inline Vec3 half_extents(const Box& box, const Transform& pose) {
           projected_half_length(box.half_extents, pose.basis.row[2])};
 }
 
-/// Slab test (Kay and Kajiya 1986). A ray that enters through an edge hits the face whose axis
-/// comes first.
+/// Slab test (Kay and Kajiya 1986). A ray that enters through an edge hits the face with the lower
+/// axis index.
 JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction, const Box& box,
                               const Transform& pose) {
   const Vec3 from = inverse_transform_point(pose, origin);
@@ -95,7 +96,7 @@ JFPX_HD inline Submerged submerged(const Box& box, const Mat3& basis, const Half
   return sum;
 }
 
-/// From the closest point of a box to a point; zero inside. Both in the axes of the box.
+/// Vector from the closest point of a box to a point, in the axes of the box; zero inside.
 JFPX_HD inline Vec3 offset_from_box(const Vec3& point, const Box& box) {
   Vec3 offset;
   for (int i = 0; i < 3; ++i) {
@@ -104,8 +105,8 @@ JFPX_HD inline Vec3 offset_from_box(const Vec3& point, const Box& box) {
   }
   return offset;
 }
-/// Distance of a sphere from a box, with the arithmetic of collide(sphere, box, pose). Not valid if
-/// it is larger than `limit`.
+/// Distance of a sphere from a box, with the arithmetic of collide(sphere, box, pose). Invalid if
+/// larger than `limit`.
 JFPX_HD inline Separation separation(const Vec3& centre, Real radius, const Posed<Box>& box,
                                      Real limit) {
   const Vec3 local = transform_transpose(box.pose.basis, centre - box.pose.origin);
@@ -141,11 +142,11 @@ JFPX_HD inline void find_contact(const SphereInstance& a, const Posed<Box>& b,
                 closest.distance - t * dot(pair.motion, n), 0, a.centre + arm);
 }
 
-/// Removes points that hardly extend the polygon of a manifold: those whose triangle with their
-/// neighbors has less than 5 % of the area of the polygon. Where corners of two boxes nearly
-/// coincide, clipping gives one to three points, which rounding decides; a corner with three points
-/// would be three times as stiff, and a stack that changes between them would not come to rest.
-/// The depth is linear in the polygon, so that a removed point is hardly deeper than the others.
+/// Removes redundant points of a manifold: points whose triangle with their neighbors has less than
+/// 5 % of the area of the polygon. At nearly coincident corners of two boxes, rounding decides
+/// whether clipping yields one, two or three points. A corner with three points would be three
+/// times as stiff, and a stack with a varying number of points would not come to rest. The depth is
+/// linear in the polygon, so a removed point is hardly deeper than the kept ones.
 JFPX_HD inline void remove_redundant_points(Manifold* manifold) {
   constexpr Real kLeastShare = Real(0.05);
   const auto point = [&](int i) {
@@ -169,7 +170,7 @@ JFPX_HD inline void remove_redundant_points(Manifold* manifold) {
   }
 }
 
-/// Two boxes, by conservative advancement along axes of separation.
+/// Two boxes, by conservative advancement along separating axes.
 JFPX_HD inline void find_contact(const Posed<Box>& a, const Posed<Box>& b, const PairMotion& pair,
                                  PairManifold* manifold) {
   Transform pose = a.pose;
@@ -198,7 +199,7 @@ JFPX_HD inline void find_contact(const Posed<Box>& a, const Posed<Box>& b, const
   }
 }
 
-/// The order of the corners is that of collide(box, pose, half_space).
+/// The corners have the order of collide(box, pose, half_space).
 JFPX_HD inline void find_contact(const Posed<Box>& a, const HalfSpace& wall, const PairMotion& pair,
                                  PairManifold* manifold) {
   const Vec3& h = a.shape.half_extents;

@@ -24,8 +24,8 @@ inline double volume(const Capsule& capsule) {
   const auto r = static_cast<double>(capsule.radius), h = static_cast<double>(capsule.half_height);
   return 3.14159265358979323846 * r * r * (2 * h + 4.0 / 3.0 * r);
 }
-/// [kg m^2], principal moments of a solid capsule: those of a cylinder and of two half balls, whose
-/// centres of mass are 3/8 of the radius from their plane faces.
+/// [kg m^2], principal moments of a solid capsule: a cylinder and two half balls, whose centres of
+/// mass are 3/8 of the radius from their plane faces.
 JFPX_HD constexpr Vec3 moments_of_inertia(const Capsule& capsule, Real mass) {
   const Real r = capsule.radius, h = capsule.half_height;
   const Real cylinder = mass * (3 * h / (3 * h + 2 * r)), balls = mass - cylinder;
@@ -63,7 +63,7 @@ JFPX_HD inline Segment axis_of(const Posed<Capsule>& capsule) {
 }
 
 /// The first entry into the cylinder between the half balls, or into one of the balls. The half
-/// chord of the cylinder is computed as that of a sphere.
+/// chord of the cylinder is computed like that of a sphere.
 JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction, const Capsule& capsule,
                               const Transform& pose) {
   const Segment segment = axis_of({capsule, pose});
@@ -94,24 +94,24 @@ JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction, const C
   return {true, distance, normalized(add_scaled(beside, heading, -half_chord))};
 }
 
-/// Volume below a plane of a polyhedron with the volume of the capsule: the corners are those of a
-/// regular polygon with twelve sides on each of six circles. The error of a part of the volume is
-/// below 1 % of the whole.
+/// Volume below a plane, for a polyhedron with the volume of the capsule: its corners are those of
+/// a regular polygon with twelve sides on each of six circles. The error of a partial volume is
+/// below 1 % of the total volume.
 /// @param basis axes of the capsule; its centre is the origin
 JFPX_HD inline Submerged submerged(const Capsule& capsule, const Mat3& basis,
                                    const HalfSpace& liquid) {
   constexpr int kSides = 12, kRings = 6;
   constexpr Real kHalfRoot3 = Real(0.86602540378443864676);
   constexpr Real kCosines[4] = {1, kHalfRoot3, Real(0.5), 0};  // of 0, 30, 60 and 90 degrees
-  // Factors of the radius that give the polygon the area of the circle, and a stack of prismatoids
-  // on it the volume of the half ball.
+  // Factors of the radius with which the polygon has the area of the circle, and the stack of
+  // prismatoids has the volume of the half ball.
   constexpr Real kAcross = Real(1.02332670794648848847), kAlong = Real(1.07179676972449087);
   const auto cosine = [&](int twelfths) {
     const int i = twelfths % kSides, mirrored = i > 6 ? kSides - i : i;
     return mirrored > 3 ? -kCosines[6 - mirrored] : kCosines[mirrored];
   };
   const auto corner = [&](int ring, int side) {
-    // Rings 0 to 2 are those of the lower half ball from the pole upwards, without the pole.
+    // Rings 0 to 2 belong to the lower half ball, from the pole upwards, without the pole.
     const int latitude = ring < 3 ? 2 - ring : ring - 3;
     const Real sign = ring < 3 ? Real(-1) : Real(1);
     const Real across = capsule.radius * kAcross * kCosines[latitude];
@@ -142,9 +142,9 @@ JFPX_HD inline Submerged submerged(const Capsule& capsule, const Mat3& basis,
   return sum;
 }
 
-/// Adds the point of a contact where the surface of a capsule is closest to the other shape.
-/// @param core     [m], point of the capsule's axis, after the part of the motion `shift`
-/// @param distance [m], after that part
+/// Adds the contact point at which the surface of a capsule is closest to the other shape.
+/// @param core     [m], point of the capsule's axis after the fraction `shift` of the motion
+/// @param distance [m], after that fraction
 JFPX_HD inline void add_point(const Posed<Capsule>& capsule, const Vec3& core, const Vec3& shift,
                               Real distance, std::uint32_t feature, const PairMotion& pair,
                               PairManifold* manifold) {
@@ -154,13 +154,13 @@ JFPX_HD inline void add_point(const Posed<Capsule>& capsule, const Vec3& core, c
                 distance - dot(shift, manifold->normal), feature, point - shift);
 }
 
-/// The capsule after a part of the motion.
+/// The capsule after a fraction of the motion.
 JFPX_HD inline Posed<Capsule> moved(const Posed<Capsule>& capsule, const PairMotion& pair, Real t) {
   return {capsule.shape, {capsule.pose.basis, moved(capsule.pose.origin, pair, t)}};
 }
 
-/// A capsule and a ball: the closest point of the axis. A centre on the axis has no normal; it is
-/// then the x axis of the capsule.
+/// A capsule and a ball, by the closest point of the axis. If the centre is on the axis, the normal
+/// is the x axis of the capsule.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const SphereInstance& b,
                                  const PairMotion& pair, PairManifold* manifold) {
   Vec3 core;
@@ -180,7 +180,7 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const SphereInstance& 
   add_point(a, core, pair.motion * t, closest.distance, 0, pair, manifold);
 }
 
-/// The half balls of a capsule on a half-space.
+/// The half balls of a capsule against a half-space.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const HalfSpace& wall,
                                  const PairMotion& pair, PairManifold* manifold) {
   const Segment segment = axis_of(a);
@@ -188,11 +188,11 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const HalfSpace& wall,
   add_corner(segment.point(segment.half_length), a.shape.radius, wall, 1, pair, manifold);
 }
 
-/// Features of the points of a capsule: those at the lower and the upper end of the common part of
-/// two axes, or of an axis and a face, and a single point.
+/// Features of the points of a capsule: the lower and the upper end of the overlap of two axes, or
+/// of an axis and a face, and a single point.
 inline constexpr std::uint32_t kLowerPoint = 0, kUpperPoint = 1, kSinglePoint = 2;
-/// [-], of the radius: two points replace the closest points only if one of them is as deep as
-/// these, to this part.
+/// [-], fraction of the radius. Two points replace the closest points only if one of them is as
+/// deep as these up to this tolerance.
 inline constexpr Real kNearlyDeepest = Real(0.01);
 
 /// Parameters of the closest points of two segments (Ericson 2005, 5.1.9).
@@ -203,7 +203,7 @@ JFPX_HD inline ClosestPoints closest_points(const Segment& a, const Segment& b) 
   const Vec3 across = a.centre - b.centre;
   const Real cosine = dot(a.axis, b.axis), from_a = dot(a.axis, across),
              from_b = dot(b.axis, across);
-  // The sine loses half as few digits as 1 - cosine^2 for axes at a small angle.
+  // For axes at a small angle, the sine loses half as few digits as 1 - cosine^2.
   const Real sine2 = length_squared(cross(a.axis, b.axis));
   ClosestPoints t;
   t.a = sine2 > 4 * kEpsilon ? a.clamp((cosine * from_b - from_a) / sine2) : Real(0);
@@ -212,8 +212,8 @@ JFPX_HD inline ClosestPoints closest_points(const Segment& a, const Segment& b) 
   return t;
 }
 
-/// Two capsules. If their axes are within 3 degrees of each other, two points at the ends of their
-/// common part, so that a capsule rests on another one; otherwise, or if the axes cross each other
+/// Two capsules. If their axes are within 3 degrees of parallel, two points at the ends of the
+/// overlap of the axes, so that a capsule can rest on another one. Otherwise, or if the axes cross
 /// between these ends, the closest points.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Capsule>& b,
                                  const PairMotion& pair, PairManifold* manifold) {
@@ -270,17 +270,17 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Capsule>& 
   if (manifold->point_count == 0) add_single();
 }
 
-/// The axis of a capsule in the axes of a box, and what the axis and the box have closest.
+/// The axis of a capsule in the axes of a box, and the closest features of the axis and the box.
 struct CapsuleOnBox {
   Segment segment;
-  Real nearest = 0;   ///< parameter of the point of the axis
+  Real nearest = 0;   ///< parameter of the closest point of the axis
   Vec3 normal;        ///< unit, from the box to the capsule
   Real distance = 0;  ///< [m], of the axis from the box; < 0: depth
 };
 
 /// Parameter of the point of a segment that is closest to a box. The derivative of the squared
-/// distance is linear between the parameters at which the segment crosses the planes of the faces,
-/// and does not decrease; so the zero is between two of them.
+/// distance is piecewise linear and does not decrease; its breakpoints are the intersections with
+/// the planes of the faces. The zero is therefore between two breakpoints.
 JFPX_HD inline Real closest_to_box(const Segment& segment, const Box& box) {
   const auto slope = [&](Real t) {
     return dot(segment.axis, offset_from_box(segment.point(t), box));
@@ -297,7 +297,7 @@ JFPX_HD inline Real closest_to_box(const Segment& segment, const Box& box) {
       const Real s = slope(t);
       if (s < 0) below = t, slope_below = s;
       if (s > 0) above = t, slope_above = s;
-      if (s == 0) {  // the middle of where the distance is constant
+      if (s == 0) {  // the middle of the interval with constant distance
         if (slope_below < 0)
           below = t, slope_below = 0;
         else if (slope_above > 0)
@@ -310,7 +310,7 @@ JFPX_HD inline Real closest_to_box(const Segment& segment, const Box& box) {
   return below - slope_below * ((above - below) / rise);
 }
 
-/// An axis that intersects the box: the axis of least depth, as for two boxes.
+/// For an axis that intersects the box: the axis of least depth, as for two boxes.
 JFPX_HD inline void find_depth(const Box& box, CapsuleOnBox* state) {
   const Segment& s = state->segment;
   const Real size = length(box.half_extents) + s.half_length, error = 8 * kEpsilon * size;
@@ -333,7 +333,7 @@ JFPX_HD inline void find_depth(const Box& box, CapsuleOnBox* state) {
   state->normal = least.normal;
   state->distance = least.distance;
   if (least.axis < 3) return;
-  // The point of the axis closest to the line of the box's edge that is farthest along the normal.
+  // The point of the capsule's axis closest to the box edge that is farthest along the normal.
   const Vec3 edge = unit_axis(least.axis - 3);
   Vec3 corner = support(box.half_extents, Mat3{}, {}, least.normal);
   corner[least.axis - 3] = 0;
@@ -341,8 +341,8 @@ JFPX_HD inline void find_depth(const Box& box, CapsuleOnBox* state) {
   state->nearest = closest_points(s, line).a;
 }
 
-/// A capsule and a box. Where the normal is that of a face, to within 3 degrees, the points are the
-/// ends of the part of the axis above the face, so that a capsule rests on a box; otherwise the
+/// A capsule and a box. If the normal is within 3 degrees of a face normal, the points are the ends
+/// of the part of the axis above the face, so that a capsule can rest on a box. Otherwise, the
 /// closest points.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Box>& b,
                                  const PairMotion& pair, PairManifold* manifold) {
@@ -396,7 +396,7 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Box>& b,
       return side * segment.point(at)[face] - b.shape.half_extents[face];
     };
     const Real low = height(lower), high = height(upper);
-    // Unless an end beside the face is deeper.
+    // Exception: an end beside the face is deeper.
     if ((low < high ? low : high) <= state.distance + kNearlyDeepest * a.shape.radius) {
       const Real highest = pair.margin + a.shape.radius;
       manifold->normal = axes.column(face) * side;

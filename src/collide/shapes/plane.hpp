@@ -1,5 +1,4 @@
-/// The two-sided plane: name and ray. Contacts treat it as the half-space behind its front or its
-/// back.
+/// The two-sided plane: name and ray. Contact tests use the half-space behind its front or back.
 #pragma once
 
 #include "src/collide/shapes/half_space.hpp"

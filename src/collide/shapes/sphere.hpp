@@ -39,9 +39,9 @@ JFPX_HD inline Vec3 half_extents(const Sphere& sphere, const Transform&) {
   return {sphere.radius, sphere.radius, sphere.radius};
 }
 
-/// The half chord is computed from the distance between the centre and the line, and not from the
-/// difference of two large squares, so that the result is accurate for small spheres far away.
-/// Lengths are divided by the radius, because the square of a small radius may underflow.
+/// The half chord is computed from the distance between the centre and the line instead of the
+/// difference of two large squares, which would be inaccurate for small distant spheres. Lengths
+/// are divided by the radius, because the square of a small radius may underflow.
 JFPX_HD inline RayEntry enter(const Vec3& origin, const Vec3& direction,
                               const SphereInstance& sphere) {
   const Real r = sphere.radius;
@@ -69,20 +69,20 @@ JFPX_HD constexpr Real submerged_volume(Real radius, Real height) {
   const Real depth = height < radius ? height + radius : 2 * radius;
   return kPi / 3 * depth * depth * (3 * radius - depth);
 }
-/// Buoyancy acts through the centre of a sphere, and so the moment is zero.
+/// Buoyancy acts through the centre of a sphere, so the moment is zero.
 JFPX_HD inline Submerged submerged(const Sphere& sphere, const Mat3&, const HalfSpace& liquid) {
   return {submerged_volume(sphere.radius, liquid.offset), {}};
 }
 
-/// A contact along one normal. If the shapes meet during the step, it is that of the time of
-/// impact: the gap along its normal closes when they meet, and a pair that passes by has none.
+/// A contact along one normal. If the shapes will touch during the step, the normal is that at the
+/// time of impact: the gap along the normal is zero then. A pair that passes by has no contact.
 struct SpeculativeContact {
   bool found = false;
   Vec3 normal;        ///< unit, from b to a
   Real distance = 0;  ///< [m], gap at the start of the step along the normal; <= 0: penetration
 };
 
-/// Two spheres. Contacts at the start of the step have the arithmetic of SphereCollider.
+/// Two spheres. Contacts at the start of the step use the arithmetic of SphereCollider.
 /// @param motion [m], of a relative to b during the step
 /// @param margin [m], >= 0
 JFPX_HD inline SpeculativeContact find_speculative(const SphereInstance& a, const SphereInstance& b,

@@ -17,11 +17,11 @@ inline namespace JFPX_ABI {
 /// solved in parallel.
 ///
 /// Graph colorings of constraint solvers usually choose any free color. This one preserves the
-/// order of the contacts at every body: the color of a contact is one more than the highest color
-/// of the earlier contacts that move one of its bodies, which is its level in the dependency graph.
-/// Solving the colors in ascending order therefore gives the results of the serial order.
+/// order of the contacts of each body: the color of a contact is one more than the highest color of
+/// the earlier contacts that move one of its bodies, which is its level in the dependency graph.
+/// Solving the colors in ascending order therefore yields the results of the serial order.
 ///
-/// Owns its buffers, which only grow, so that most calls allocate nothing. One thread at a time.
+/// Owns its buffers, which grow and never shrink. One thread at a time.
 class JFPX_API ContactColoring {
  public:
   /// Reserves memory for build(). @throws OutOfMemory
@@ -39,7 +39,7 @@ class JFPX_API ContactColoring {
 
  private:
   std::uint32_t color_count_ = 0;
-  Buffer<std::uint32_t> next_color_;     ///< by body: the lowest color of its next contact
+  Buffer<std::uint32_t> next_color_;     ///< by body: lowest possible color of the next contact
   Buffer<std::uint32_t> contact_color_;  ///< by contact
   Buffer<std::uint32_t> contact_count_;  ///< by color
 };

@@ -78,7 +78,7 @@ JFPX_ROW void store3(Real* fields, const Vec3Of<S>& v) {
   S::store(fields + 2 * kLanes, v.z);
 }
 
-/// State of one body of a contact, as the setup of rows uses it.
+/// State of one body of a contact, as input of the row setup.
 template <class S>
 struct BodyOf {
   using V3 = Vec3Of<S>;
@@ -156,7 +156,7 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
   const V3 angular_a = a.angular_response(torque_a), angular_b = b.angular_response(-torque_b);
   const auto denominator_a = S::keep(a.real, a.inverse_mass + dot(n, cross(angular_a, arm_a)));
   const auto denominator_b = S::keep(b.real, b.inverse_mass + dot(n, cross(-angular_b, arm_b)));
-  // Lanes without a contact have no body: 1 replaces 1/0.
+  // Lanes without a contact have no body: replaces 1/0 by 1.
   const auto used = S::either(a.real, b.real);
   const auto inverse = S::select(
       used, S::set(settings.relaxation) / (denominator_a + denominator_b + cfm), S::set(1));
@@ -341,10 +341,10 @@ struct Residual {
   }
 };
 
-// `Sum` below is a Residual<S>, or a type that adds to one later.
+// `Sum` below is a Residual<S>, or a type that adds to a Residual<S> later.
 
-/// Solves a contact row, or its split impulse against penetration. The two differ in the fields and
-/// in the velocities that they use.
+/// Solves a contact row or its split impulse against penetration, which use different fields and
+/// velocities.
 template <class S, bool kFactors, bool kSplitImpulse, class Sum>
 JFPX_ROW void solve_contact(const typename S::Id* ids, Real* velocities, const Real* factors,
                             Real* row, Sum* residual) {
@@ -393,7 +393,7 @@ JFPX_ROW void solve_limited(const typename S::Id* ids, Real* velocities, const R
   residual->add(impulse, inverse, active);
 }
 
-/// Solves a friction row, which the impulse of its contact limits.
+/// Solves a friction row, whose impulse is limited by that of its contact.
 template <class S, bool kFactors, class Sum>
 JFPX_ROW void solve_friction(const typename S::Id* ids, Real* velocities, const Real* factors,
                              const Real* contact, Real* row, Sum* residual) {
@@ -407,8 +407,8 @@ JFPX_ROW void solve_friction(const typename S::Id* ids, Real* velocities, const 
                              S::load(row + kRowFriction * kLanes) * pressure, active, residual);
 }
 
-/// Solves a rolling or spinning friction row: an angular impulse, which the impulse of its contact
-/// limits.
+/// Solves a rolling or spinning friction row: an angular impulse, limited by the impulse of its
+/// contact.
 template <class S, bool kFactors, class Sum>
 JFPX_ROW void solve_rolling_friction(const typename S::Id* ids, Real* velocities,
                                      const Real* factors, const Real* contact, Real* row,
@@ -423,7 +423,7 @@ JFPX_ROW void solve_rolling_friction(const typename S::Id* ids, Real* velocities
   const auto limit = strength * pressure;
   const auto upper = S::select(S::less(strength, limit), strength, limit);
   const Vec3Of<S> axis_a = {zero, zero, zero};
-  const Vec3Of<S> axis_b = -axis_a;  // Bullet multiplies with it too
+  const Vec3Of<S> axis_b = -axis_a;  // Bullet also multiplies by -axis
   solve_limited<S, kFactors>(ids, velocities, factors, row, axis_a, axis_b, upper, active,
                              residual);
 }

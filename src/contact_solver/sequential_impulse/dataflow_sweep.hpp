@@ -16,15 +16,14 @@ namespace rows {
 // the schedule.
 //
 // The velocities of a body are stored in cells of 16 bytes, which are loaded and stored atomically.
-// Each cell contains the body's sequence number: the number of steps that have moved the body. A
-// worker that finds the sequence number of its step in all cells of a body has also received the
-// velocities, in the same 16-byte loads, and no other worker writes the cells before this worker
-// does. The rows of a contact are changed only by the worker of the contact; the programs for
-// velocities and for the split impulse change different fields. So no lock, flag or fence is
-// needed.
+// Each cell contains the body's sequence number: the number of steps that have moved the body. If
+// all cells of a body have the sequence number of a worker's step, the same 16-byte loads have
+// returned the velocities, and no other worker writes the cells before this worker does. Only the
+// worker of a contact changes its rows; the programs for velocities and for the split impulse
+// change different fields. So no lock, flag or fence is needed.
 //
-// In the schedule, every contact follows the contacts that it depends on (see RowOrder). So the
-// first step that is not done, in the order of passes and of the schedule, never waits, and its
+// In the schedule, every contact follows the contacts on which it depends (see RowOrder). So the
+// first incomplete step, in the order of passes and of the schedule, is always ready, and its
 // worker has no earlier step to execute. Hence the sweeps terminate if every worker makes progress.
 
 inline constexpr int kBodyCells = 6 / kCellNumbers;
@@ -39,8 +38,8 @@ struct ScheduledContact {
 };
 
 /// Kinds of passes over the scheduled contacts. `both` solves each contact and then its friction.
-/// `frictions` and `rolling_frictions` need only the impulse of the contact row, the others all of
-/// it.
+/// `frictions` and `rolling_frictions` read only the impulse of the contact row, other passes the
+/// whole row.
 enum class RowStep : std::uint8_t {
   warm_start,
   contacts,
@@ -67,7 +66,7 @@ struct ScheduleArrays {
   std::uint32_t count;                  ///< scheduled contacts
 };
 
-/// Results of a contact that the host reads.
+/// Results of a contact for the host.
 struct ContactOutcome {
   Real direction[3];         ///< first friction direction
   Real second[3];            ///< second direction, if has_second or there is friction along it
@@ -83,7 +82,7 @@ struct RowGroupArrays {
   const Real* inputs;             ///< by contact, kInputFields each
   const std::uint32_t* contacts;  ///< by slot of `main`: index of the contact
   /// By contact: index of its kRollingFrictionRows rows, or kNoRollingFriction; null if no contact
-  /// has any.
+  /// has rolling friction.
   const std::uint32_t* rolling_frictions;
   Real* contact_rows;           ///< by slot
   Real* friction_rows;          ///< by slot, then by direction
@@ -102,8 +101,8 @@ struct RowGroupArrays {
 inline constexpr int kOutcomeVelocities = 12;
 
 /// One of the two bodies of a row: whether it is body b, whether it is not Bullet's fixed body, and
-/// whether rows move it. A worker has a local copy of the velocities of both bodies. Elements of
-/// the copy are selected by value, not by address, so that a GPU keeps them in registers.
+/// whether rows move it. A worker copies the velocities of both bodies. Elements of the copy are
+/// selected by value, not by address, so that a GPU keeps them in registers.
 struct LocalBody {
   bool second, real, moved;
 };
@@ -122,7 +121,7 @@ struct LocalLane : OneLane {
   }
 };
 
-/// Defers the last residual until no other thread waits for the step, because its division is slow.
+/// Postpones the slow division of the last residual until no thread waits for the step.
 struct DeferredResidual {
   Residual<OneLane> sum;
   Real impulse = 0, inverse = 1;
@@ -216,8 +215,8 @@ JFPX_ROW bool finish_body(const RowGroupArrays& group, std::uint32_t body) {
 }
 
 /// Solves some contacts of a program in all passes, one step at a time, for one thread. `Cells`
-/// loads and stores cells atomically. A `Results` object receives the largest squared residual of
-/// every iteration, and a call of broken() for a residual that is NaN.
+/// loads and stores cells atomically. `Results` receives the largest squared residual of every
+/// iteration, and a call of broken() for a residual that is NaN.
 template <class Cells, bool kFactors, bool kSplitImpulse>
 class SweepWorker {
  public:
@@ -285,7 +284,7 @@ class SweepWorker {
       if (id >= 0) (i == 0 ? count_a_ : count_b_) = order_.contact_counts[slot];
     }
   }
-  /// Loads the row before the thread waits for its bodies.
+  /// Loads the row while the bodies are not ready.
   JFPX_ROW void prepare_row() {
     sequence_a_ = pass_ * count_a_ + scheduled_.rank_a;
     sequence_b_ = pass_ * count_b_ + scheduled_.rank_b;
@@ -309,7 +308,7 @@ class SweepWorker {
 
   /// Loads the velocities of a body if its sequence number has been reached.
   /// @param side 0 for body a, 1 for body b
-  /// @return 0 if so, else the number of steps at the body that must precede it
+  /// @return 0 on success, else the number of steps of the body that must precede
   JFPX_ROW std::uint32_t poll(std::int32_t body, std::uint32_t sequence, int side, bool* has) {
     const Cell* cells = order_.cells + std::size_t{static_cast<std::uint32_t>(body)} * kBodyCells;
     Cell read[kBodyCells];
@@ -363,7 +362,7 @@ class SweepWorker {
       }
     }
   }
-  /// The first friction row is in row_.
+  /// Requires the first friction row in row_.
   JFPX_ROW void solve_friction_rows(const Real* factors, DeferredResidual* residual) {
     Real contact[kRowImpulse + 1];
     contact[kRowImpulse] = pressure_;

@@ -26,7 +26,7 @@ struct GroupInputs {
   Real* factors;   ///< kFactorFields each; null if all factors are 1
   Real* contacts;  ///< kInputFields each
   /// By contact: index of its kRollingFrictionRows rows, or kNoRollingFriction; null if no contact
-  /// has any.
+  /// has rolling friction.
   std::uint32_t* rolling_frictions;
   Real* rolling_friction_rows;       ///< kRollingFrictionRows * kFrictionFields each
   rows::ScheduledContact* schedule;  ///< see RowOrder::build()
@@ -75,14 +75,13 @@ JFPX_API GroupSolverMaker cuda_group_solver_maker(int device);
 /// Results of one run over a group.
 struct GroupResults {
   const double* residuals;                ///< largest squared residual of each sweep
-  const double* split_impulse_residuals;  ///< the same for the sweeps of the split impulse
+  const double* split_impulse_residuals;  ///< largest squared residual of each split impulse sweep
   std::uint64_t split_impulses;           ///< number of contacts with a split impulse
   bool broken;                            ///< a value is infinite or NaN
 };
 
 /// Solves a group with the number of sweeps that the threshold requires. All sweeps overlap, so the
-/// residual that ends them is known only afterwards: the group is then solved again with that
-/// number of sweeps.
+/// number is known only afterwards: the group is then solved again with that number of sweeps.
 /// @param run GroupResults(iterations, split impulse iterations)
 template <class Run>
 rows::RowSweepReport sweep_until_small(const GroupSweeps& sweeps, const Run& run) {

@@ -45,8 +45,8 @@ enum InputField : int {
   kInputFields = 16,
 };
 
-/// A body is addressed by its id. A body that no row moves is addressed by the complement ~id.
-/// Id 0 is Bullet's single fixed body, which is at rest and all 0.
+/// Body id. The complement ~id addresses a body that no row moves. Id 0 is Bullet's single fixed
+/// body, which is at rest; all its fields are 0.
 inline constexpr std::int32_t kFixedBody = ~0;
 inline constexpr int kBodyFields = 32;  ///< see gather_body()
 /// Delta linear velocity, inverse mass; delta angular velocity, unused.

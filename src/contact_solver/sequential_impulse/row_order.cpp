@@ -33,7 +33,7 @@ void RowOrder::build(std::span<const rows::RowPair> pairs, std::size_t bodies,
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     slot_contacts[next_slot_[colors[i]]++] = static_cast<std::uint32_t>(i);
   }
-  // In the order of colors each body still meets its contacts in the given order.
+  // The order of colors preserves the given order of the contacts of each body.
   std::fill_n(contact_counts, bodies, 0u);
   for (std::uint32_t k = 0; k < pairs.size(); ++k) {
     const auto [a, b] = pairs[slot_contacts[k]];

@@ -13,9 +13,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Sorts contacts by color. In this order every contact follows those that it depends on, so that
-/// the sweeps terminate, and adjacent contacts rarely depend on each other, so that they rarely
-/// wait. Owns its buffers, which only grow. One thread at a time.
+/// Sorts contacts by color. In this order every contact follows the contacts on which it depends,
+/// so that the sweeps terminate. Adjacent contacts rarely depend on each other, which keeps waiting
+/// times short. Owns its buffers, which grow and never shrink. One thread at a time.
 class JFPX_API RowOrder {
  public:
   /// Reserves memory for build(). @throws OutOfMemory

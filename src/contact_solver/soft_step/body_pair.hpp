@@ -13,7 +13,7 @@ struct BodyPair {
   const Mat3 *inertia_a, *inertia_b;
 };
 
-/// Orientations of the bodies of a row at this moment of the step.
+/// Orientations of the bodies of a row at the time of the sweep.
 struct PairOrientations {
   const Quat *a = nullptr, *b = nullptr;
 };

@@ -14,11 +14,11 @@ namespace {
 
 constexpr std::size_t kMatchesPerChunk = 2048;
 
-/// Finds contacts of a sorted list by ascending keys.
+/// Finds contacts in a sorted list, for ascending keys.
 template <class Contact>
 class Finder {
  public:
-  /// @param first key that is not above those to be found
+  /// @param first lower bound of the keys
   Finder(const std::vector<Contact>& sorted, const ContactKey& first)
       : next_(std::ranges::lower_bound(sorted, first, {}, &Contact::key)),
         begin_(sorted.begin()),
@@ -91,9 +91,8 @@ void ContactCache::match_joints(const JointView& joints, std::span<const Real> i
   uncolored.flush();
 }
 
-/// Gives contact i the rolling impulse and the color of the same contact of the last step. A
-/// contact without a color gets that of a contact with a fixed body, or one in
-/// GreedyColoring::finish().
+/// Assigns to contact i the rolling impulse and the color of the same contact of the last step. A
+/// contact without a color gets kFixedColor, or a color from GreedyColoring::finish().
 /// @param before number in the last step, if `is_kept`
 void ContactCache::keep(std::uint32_t i, bool is_kept, std::uint32_t before,
                         std::span<const Real> inverse_mass, GreedyColoring::Portion* uncolored) {
@@ -170,14 +169,14 @@ void ContactCache::forget(std::uint32_t body) noexcept {
   any_forgotten_ = true;
 }
 
-/// The impulses of removed manifolds stay unused until the next step.
+/// The impulses of removed manifolds remain unused until the next step.
 void ContactCache::drop_forgotten() noexcept {
   if (!any_forgotten_) return;
   ContactSet& set = last_;
   const auto involved = [this](const ContactKey& key) {
     return forgotten_[key.a] != 0 || forgotten_[key.b] != 0;
   };
-  // Points keep their indices, so their impulses must keep their distance from the first one.
+  // Points keep their indices, so the offset of their impulses must not change.
   const auto spheres = static_cast<std::uint32_t>(set.spheres.size());
   std::uint32_t kept = 0, kept_spheres = 0;
   const auto keep_contact = [&, has_rolling = set.has_rolling()](std::uint32_t i) {

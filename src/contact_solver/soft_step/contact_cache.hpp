@@ -29,8 +29,8 @@ class ContactCache {
   /// drop_forgotten() must have been called since the last forget().
   const ContactSet& last() const { return last_; }
 
-  /// Gives each contact and joint the impulses and the color that it had in the last step, and
-  /// colors the new ones.
+  /// Assigns to each contact and joint its impulses and color of the last step, and colors the new
+  /// ones.
   /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
   /// @param any_rolls whether a body has rolling or spinning friction
   /// @param pool null: in the calling thread
@@ -38,17 +38,18 @@ class ContactCache {
              ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
-  /// Makes room for forget() of bodies with indices below `bodies`. @throws std::bad_alloc
+  /// Reserves memory for forget() of bodies with indices below `bodies`. @throws std::bad_alloc
   void reserve(std::size_t bodies);
   /// Replaces the contacts of the last completed step.
   void restore(ContactSet last) noexcept;
-  /// Removes the contacts of a body: takes constant time, and drop_forgotten() does the work for
-  /// all removed bodies together. Bodies that match() and reserve() did not include have none.
+  /// Marks the contacts of a body as removed, in constant time; drop_forgotten() removes the
+  /// contacts of all marked bodies. Bodies that match() and reserve() did not include have no
+  /// contacts.
   void forget(std::uint32_t body) noexcept;
   void drop_forgotten() noexcept;
-  /// Revokes forget(): the last contacts are now those of a step after it.
+  /// Clears the marks of forget(): the last contacts are now those of a later step.
   void forget_none() noexcept;
-  /// Replaces the contacts of the last completed step, as they were before forget().
+  /// Replaces the contacts of the last completed step by contacts as before forget().
   void replace_last(ContactSet last) noexcept { last_ = std::move(last); }
 
  private:
@@ -59,7 +60,7 @@ class ContactCache {
             GreedyColoring::Portion* uncolored);
 
   ContactSet current_, last_;
-  std::vector<std::uint8_t> forgotten_;  ///< by body: 1 if last_ must lose its contacts
+  std::vector<std::uint8_t> forgotten_;  ///< by body: 1 if its contacts in last_ must be removed
   bool any_forgotten_ = false;
   GreedyColoring coloring_;
 };

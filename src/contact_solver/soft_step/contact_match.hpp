@@ -1,4 +1,4 @@
-/// What a contact takes over from the same contact of the last step.
+/// Transfer of impulses from a contact of the last step to the same contact of this step.
 #pragma once
 
 #include "src/contact_solver/soft_step/contact_set.hpp"
@@ -7,16 +7,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// The impulse at the start of the next step. RowSetup turns its friction into the new tangent
-/// plane, so that the impulses of contacts without a row, of sleeping bodies, stay what they are.
+/// The impulse at the start of the next step. RowSetup projects its friction onto the new tangent
+/// plane, so that the impulses of contacts without a row (of sleeping bodies) do not change.
 JFPX_HD inline KeptImpulse at_start_of_step(const KeptImpulse& kept) {
   return {kept.friction, kept.normal > 0 ? kept.normal : Real(0)};
 }
 
 /// Adds the impulses of a manifold of the last step to those of the same manifold of this step.
-/// Each point gets the impulse of the point with the same feature. An old point without successor
-/// gives its impulse to the nearest new point: where edges of two boxes coincide, rounding decides
-/// which features meet there, and a stack that lost its impulses now and then would not come to
+/// Each point gets the impulse of the point with the same feature. The impulse of an old point
+/// without a matching feature is added to the nearest new point. Rounding decides the features
+/// where edges of two boxes coincide, and a stack that occasionally lost impulses would not come to
 /// rest.
 /// @param m,before indices of the manifolds
 JFPX_HD inline void match_points(const ContactView& now, std::uint32_t m, const ContactView& last,

@@ -1,5 +1,5 @@
-/// Contacts of a step for the soft-step solver, with the impulses and colors that they keep for the
-/// next step.
+/// Contacts of a step for the soft-step solver, with their impulses and colors for the warm start
+/// of the next step.
 #pragma once
 
 #include "src/collide/pair_manifold.hpp"
@@ -17,7 +17,7 @@ namespace soft_step {
 struct ContactKey {
   std::uint32_t a = 0, b = 0;
   std::uint32_t part_a = 0, part_b = 0;
-  /// `part_a` of the contacts of contact generators; those of shapes have lower numbers.
+  /// `part_a` of the contacts of contact generators; parts of shapes have lower numbers.
   static constexpr std::uint32_t kGenerated = 0xffffffffu;
   /// `part_a` of joints; `part_b` is the slot of its id.
   static constexpr std::uint32_t kJoint = kGenerated - 1;
@@ -37,7 +37,7 @@ struct ManifoldInput {
   ContactKey key;
   Vec3 normal;                         ///< unit, from b to a
   std::uint32_t first = 0, count = 0;  ///< range of points
-  /// [-], of a generated contact; the others combine those of the bodies.
+  /// [-], of a generated contact; for other contacts, combined from those of the bodies
   Real friction = 0, restitution = 0;
 };
 using PointInput = detail::SolverPoint;
@@ -46,14 +46,14 @@ using PointInput = detail::SolverPoint;
 struct KeptImpulse {
   Vec3 friction;
   Real normal = 0;  ///< >= 0, or kReleased
-  /// `normal` of bodies that have pushed each other during the step, but not at its end.
+  /// `normal` of bodies that pushed each other during the step, but not at its end
   static constexpr Real kReleased = -1;
   JFPX_HD bool has_pushed() const { return normal != 0; }
 };
 
-/// The arrays of a ContactSet, in host memory or on a device. Both lists are sorted by key.
-/// Contacts are numbered: first those of spheres, then the manifolds. Impulses are numbered alike:
-/// one for each contact of spheres, then one for each point.
+/// The arrays of a ContactSet, in host memory or on a device. Both lists are sorted by key. Contact
+/// numbers: first contacts of spheres, then manifolds. Impulse numbers: first one impulse for each
+/// contact of spheres, then one for each point.
 struct ContactView {
   SphereContactInput* spheres = nullptr;
   ManifoldInput* manifolds = nullptr;
@@ -75,7 +75,7 @@ struct ContactView {
   JFPX_HD const Vec3& normal(std::uint32_t contact) const {
     return is_sphere(contact) ? spheres[contact].normal : manifold(contact).normal;
   }
-  /// Distance of a point of a contact; that of two spheres has point 0 only.
+  /// Distance of a point of a contact. A contact of two spheres has point 0 only.
   JFPX_HD Real distance(std::uint32_t contact, std::uint32_t point) const {
     return is_sphere(contact) ? spheres[contact].distance
                               : points[manifold(contact).first + point].distance;
@@ -88,7 +88,7 @@ struct ContactView {
   JFPX_HD std::uint32_t impulse_count(std::uint32_t contact) const {
     return is_sphere(contact) ? 1 : manifold(contact).count;
   }
-  /// Whether condition(distance of a point, its impulse) holds for a point of a contact.
+  /// Whether condition(distance of a point, its impulse) is true for any point of a contact.
   template <class Condition>
   JFPX_HD bool any_point(std::uint32_t contact, const Condition& condition) const {
     const std::uint32_t first = first_impulse(contact);

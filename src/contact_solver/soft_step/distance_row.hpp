@@ -1,9 +1,9 @@
 /// A DistanceJoint in a soft step: a spring, and limits of the distance of two anchors.
 ///
-/// The anchors turn with their bodies within the step, so that the axis is that of the moment in
-/// each sweep. The limits are solved for the distance at the end of the substep, with the second
-/// order of the motion across the axis: the positions follow the circle of a pendulum instead of
-/// its tangent, from which a projection would take energy (as in RATTLE: Andersen 1983).
+/// The anchors rotate with their bodies within the step, and each sweep uses the current axis. The
+/// limits are solved for the distance at the end of the substep, including the second order of the
+/// motion across the axis. The positions thus follow the circle of a pendulum instead of its
+/// tangent, whose projection would dissipate energy (as in RATTLE: Andersen 1983).
 #pragma once
 
 #include "src/contact_solver/soft_step/body_pair.hpp"
@@ -23,12 +23,11 @@ struct DistanceRow {
   Real min_length = 0, max_length = 0, rest_length = 0;  ///< [m]
   Real spring_rate = 0, damp_rate = 0;                   ///< [1/s], as DistanceInput
 
-  /// [N s]. The spring pushes the bodies apart if it is positive, the lower limit always does, and
-  /// the upper one pulls. That of a rod, whose limits are equal, may do both.
+  /// [N s]. A positive spring impulse pushes the bodies apart. The lower limit pushes, the upper
+  /// limit pulls; a rod, whose limits are equal, may do both.
   Real spring_impulse = 0, lower_impulse = 0, upper_impulse = 0;
   Real spring_error = 0;  ///< [m], length of the spring minus its rest length, in this substep
-  /// What the bodies have received in this substep: impulse on a [N s], and angular impulses on a
-  /// and against b [N m s].
+  /// Sum of this substep: impulse on a [N s], and angular impulses on a and against b [N m s].
   Vec3 impulse, twist_a, twist_b;
 
   JFPX_HD bool is_rod() const { return min_length == max_length; }
@@ -46,21 +45,22 @@ JFPX_HD inline void store_changes(const DistanceRow& from, DistanceRow* to) {
   to->twist_b = from.twist_b;
 }
 
-/// Part of an error of a joint that a substep corrects. With more, chains that swing gain energy.
+/// Fraction of a joint error that a substep corrects. With a higher value, swinging chains gain
+/// energy.
 inline constexpr Real kJointCorrection = Real(0.2);
 
 /// Square of half the largest angle [rad] by which a joint turns in a substep on an exact circle.
-/// It is not exact beyond it, where the impulse changes the velocities too much.
+/// Larger angles are inexact, because the impulse changes the velocities too much.
 inline constexpr Real kMostTurn = Real(1) / 16;
 
-/// The anchors at a moment of the step.
+/// The anchors at the time of a sweep.
 struct DistanceAxis {
   Vec3 arm_a, arm_b;  ///< [m], world axes, from the centres
   Real length;        ///< [m]
-  Vec3 direction;  ///< unit, from b's anchor to a's; of anchors that coincide, that of the x axis
+  Vec3 direction;     ///< unit, from b's anchor to a's; x axis if they coincide
 };
 
-/// @param centres from b's centre to a's
+/// @param centres from b's centre to a's centre
 JFPX_HD inline DistanceAxis axis_of(const DistanceRow& row, const Vec3& centres,
                                     const Quat& orientation_a, const Quat& orientation_b) {
   DistanceAxis axis;
@@ -84,7 +84,7 @@ JFPX_HD inline void apply_impulse(const BodyPair& pair, const Vec3& impulse, con
   }
 }
 
-/// Sets what the bodies receive by the impulses along an axis.
+/// Sets the impulses on the bodies from the impulses along an axis.
 JFPX_HD inline void set_impulse(DistanceRow* row, const DistanceAxis& axis) {
   row->impulse = axis.direction * row->total_impulse();
   row->twist_a = cross(axis.arm_a, row->impulse);
@@ -117,8 +117,8 @@ class DistanceSolver {
     mass_ = 1 / inverse_mass;
   }
 
-  /// In the first sweep of a substep, the bodies have received again what they received in the last
-  /// one, along the axis of that time.
+  /// In the first sweep of a substep: replaces the impulse of the last substep, which was applied
+  /// along the former axis, by an impulse along the current axis.
   JFPX_HD void turn_impulse() {
     const Vec3 before = row_->impulse, twist_a = row_->twist_a, twist_b = row_->twist_b;
     set_impulse(row_, axis_);
@@ -152,10 +152,10 @@ class DistanceSolver {
     row_->twist_b += twist_b;
   }
 
-  /// The force of the spring is that of the length at the start of the substep, which keeps energy,
-  /// and the damping that of the velocity at its end, which is stable. A spring that oscillates by
-  /// more than a quarter of a radian per substep is damped further, so that it is stable, too, even
-  /// if dozens of springs act on a body.
+  /// The spring force is that of the length at the start of the substep, which preserves energy.
+  /// The damping is that of the velocity at the end, which is stable. A spring that oscillates by
+  /// more than a quarter of a radian per substep is damped further, so that it is stable even if
+  /// dozens of springs act on a body.
   JFPX_HD void solve_spring() {
     constexpr Real kLargest = Real(1) / 16;
     const Real angle = step_.h * row_->spring_rate, square = angle * angle;
@@ -170,8 +170,8 @@ class DistanceSolver {
     push(change);
   }
 
-  /// Velocity by which an arm that turns with a body for a substep differs from cross(w, arm), for
-  /// integrated_orientation(), which turns by the angle 2 atan(h w / 2).
+  /// Difference between the mean velocity of an arm that rotates with a body for a substep and
+  /// cross(w, arm), for integrated_orientation(), which rotates by the angle 2 atan(h w / 2).
   JFPX_HD Vec3 turning(const SolverBody& body, const Vec3& arm) const {
     const Vec3& w = body.angular_velocity;
     const Real half = step_.h * Real(0.5), square = length_squared(w) * (half * half);
@@ -180,8 +180,8 @@ class DistanceSolver {
     return (cross(w, first) * half - first * square) * (bound / (1 + square));
   }
 
-  /// Velocity by which the length grows beyond its first order within the substep: the anchors move
-  /// across the axis, and turn with their bodies. @param limit the length at the end
+  /// Second-order part of the velocity by which the length grows within the substep: the anchors
+  /// move across the axis, and rotate with their bodies. @param limit the length at the end
   JFPX_HD Real bend(Real limit, const Vec3& across) const {
     const Real arms =
         dot(turning(*pair_.a, axis_.arm_a) - turning(*pair_.b, axis_.arm_b), axis_.direction);
@@ -191,10 +191,9 @@ class DistanceSolver {
     return arms + bounded * step_.inverse_h / (limit + square_root(square - bounded));
   }
 
-  /// Corrects a part of an error of the length by a translation of the bodies, without velocity:
+  /// Corrects a fraction of a length error by translating the bodies without changing velocities:
   /// one relax sweep would not remove the velocity from long chains, which would gain energy.
-  /// @param excess [m], by which the length is beyond the limit; below 0 for a rod that is too
-  /// short
+  /// @param excess [m], by which the length exceeds the limit; negative if a rod is too short
   JFPX_HD void project(Real excess, Real sign) {
     Real inverse_mass = pair_.a->inverse_mass;
     if constexpr (!kFixed) inverse_mass += pair_.b->inverse_mass;
@@ -205,12 +204,12 @@ class DistanceSolver {
     if constexpr (!kFixed) pair_.b->shift += impulse * pair_.b->inverse_mass;
   }
 
-  /// @param excess [m], by which the length is beyond the limit
+  /// @param excess [m], by which the length exceeds the limit
   /// @param sign   1: upper limit, -1: lower limit
   JFPX_HD void solve_limit(Real* impulse, Real excess, Real sign, bool use_bias) {
     const bool is_rod = row_->is_rod();
     const bool is_slack = !is_rod && excess <= 0;
-    // As is_idle(): a limit that is not reached acts only if it is about to be.
+    // See is_idle(): a slack limit acts only if the gap is about to close.
     if (!use_bias && is_slack && !(*impulse > 0)) return;
     const Vec3 all = velocity();
     const Real along = dot(all, axis_.direction);

@@ -14,10 +14,10 @@ namespace soft_step {
 
 namespace {
 
-/// Orders are divided by their highest bits. Hashes are uniform, so the buckets have equal sizes.
+/// Orders are divided by their highest bits. Hashes are uniform, so the buckets have similar sizes.
 constexpr unsigned kBucketBits = 6, kBuckets = 1u << kBucketBits;
 constexpr std::size_t kBodiesPerChunk = 16384;
-/// So few contacts are sorted in less time than a loop takes to begin and to end.
+/// Below this number of contacts, sorting takes less time than a parallel loop.
 constexpr std::size_t kFewContacts = 256;
 
 std::size_t bucket_of(std::uint64_t order) { return order >> (64 - kBucketBits); }

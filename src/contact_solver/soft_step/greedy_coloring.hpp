@@ -1,4 +1,4 @@
-/// Greedy coloring of the contacts of a step, which persists from step to step.
+/// Greedy coloring of contacts, whose colors persist from step to step.
 #pragma once
 
 #include "src/base/thread_pool.hpp"
@@ -16,10 +16,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Number of colors. Contacts beyond it get kOverflowColor and are solved one after the other.
+/// Number of colors. Contacts without a free color get kOverflowColor and are solved serially.
 inline constexpr std::uint8_t kColors = 64;
 inline constexpr std::uint8_t kOverflowColor = kColors;
-/// Color of a contact with an immovable or kinematic body, which needs none.
+/// Color of a contact with an immovable or kinematic body, which needs no color.
 inline constexpr std::uint8_t kFixedColor = 254;
 /// Color of a contact that has not been colored.
 inline constexpr std::uint8_t kNoColor = 255;
@@ -31,7 +31,7 @@ JFPX_HD constexpr std::uint64_t mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Place of a contact in the order of coloring; equal values are ordered by number of contact.
+/// Position of a contact in the order of coloring; ties are ordered by number of contact.
 JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
   const std::uint64_t bodies = std::uint64_t{key.a} << 32 | key.b;
   const std::uint64_t parts = std::uint64_t{key.part_a} << 32 | key.part_b;
@@ -48,17 +48,17 @@ JFPX_HD inline std::uint8_t lowest_free_color(std::uint64_t used) {
 #endif
 }
 
-/// Assigns the lowest color that neither body has to each new contact, in the order of a hash of
-/// the key. The order is a function of the keys alone, and random orders need few rounds in
-/// parallel (Blelloch, Fineman and Shun 2012). A contact that persists keeps its color, except
-/// in the overflow, whose contacts are colored again.
+/// Assigns to each new contact the lowest color that neither body has, in the order of a hash of
+/// the key. The order depends on the keys only, and random orders need few parallel rounds
+/// (Blelloch, Fineman and Shun 2012). A persistent contact keeps its color, except in the overflow,
+/// whose contacts are colored again.
 ///
 /// Usage in a step: start(), keep() for all colored contacts, Portion::add() for all others,
-/// finish(). Joints are colored with the contacts, in the order of the same hash, and numbered
-/// after them. Owns its buffers, which only grow.
+/// finish(). Joints are colored together with the contacts, in the order of the same hash, and
+/// numbered after them. Owns its buffers, which grow and never shrink.
 class GreedyColoring {
  public:
-  /// @param pool null: in the calling thread; likewise in finish()
+  /// @param pool null: start() and finish() run in the calling thread
   void start(std::size_t bodies, ThreadPool* pool);
   /// Several threads may call it concurrently.
   void keep(std::uint32_t a, std::uint32_t b, std::uint8_t color) {
@@ -66,8 +66,8 @@ class GreedyColoring {
     std::atomic_ref(used_[a]).fetch_or(bit, std::memory_order_relaxed);
     std::atomic_ref(used_[b]).fetch_or(bit, std::memory_order_relaxed);
   }
-  /// Contacts that a thread adds, in portions. Several threads may do so concurrently, each with an
-  /// object of its own.
+  /// Contacts that one thread adds, in portions. Several threads may add contacts concurrently,
+  /// each with its own object.
   class Portion;
   /// Calls assign(contact, color) for the added contacts.
   template <class Assign>
@@ -92,7 +92,7 @@ class GreedyColoring {
   void sort(ThreadPool* pool);
 
   std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
-  std::mutex mutex_;                 ///< of uncolored_
+  std::mutex mutex_;                 ///< guards uncolored_
   std::vector<Uncolored> uncolored_;
   std::vector<Uncolored> sorted_;  ///< by order and number
 };

@@ -1,4 +1,4 @@
-/// Joints of a world for the soft-step solver, with the impulses and colors that they keep.
+/// Joints of a world for the soft-step solver, with their impulses and colors.
 #pragma once
 
 #include <jfpx/joint.hpp>
@@ -30,8 +30,8 @@ struct JointInput {
   DistanceInput distance{};
 };
 
-/// What a joint keeps from step to step: impulses of the last substep [N s], the meaning of which
-/// the type of its row defines, and its color.
+/// Values of a joint for the warm start of the next step: impulses of the last substep [N s], whose
+/// meaning depends on the type of row, and the color.
 struct KeptJoint {
   static constexpr std::uint32_t kMostImpulses = 3;
   Real impulses[kMostImpulses] = {};

@@ -1,5 +1,5 @@
-/// The contact of two bodies of any shape in a soft step: up to eight points with one normal, which
-/// are solved one after the other, and rolling and spinning friction.
+/// Contact of two bodies of any shape in a soft step: up to eight points with one normal, which are
+/// solved one after the other, and rolling and spinning friction.
 #pragma once
 
 #include "src/contact_solver/soft_step/body_pair.hpp"
@@ -16,8 +16,8 @@ struct PointRow {
   Real normal_mass = 0;         ///< [kg]
   Real xx = 0, xy = 0, yy = 0;  ///< [kg], effective mass of the two tangents, at rest
   Real slip_mass = 0;           ///< [kg], the smallest effective mass of a tangent
-  /// [m/s], speed of separation after the impact; 0: no rebound. Its sign, also that of 0, is
-  /// negative until the point has pushed the bodies apart in this step.
+  /// [m/s], rebound speed after the impact; 0: no rebound. The sign bit is set, also of 0, until
+  /// the point has pushed the bodies apart in this step.
   Real rebound = 0;
   Real normal_impulse = 0;              ///< [N s]
   Real friction_x = 0, friction_y = 0;  ///< [N s], along the tangents
@@ -56,7 +56,7 @@ JFPX_HD constexpr void apply(const BodyPair& pair, const Vec3& arm_a, const Vec3
   }
 }
 
-/// As apply(), but moves the bodies.
+/// Moves the bodies; compare apply().
 template <bool kFixed>
 JFPX_HD constexpr void project(const BodyPair& pair, const PointRow& p, const Vec3& impulse) {
   pair.a->shift += impulse * pair.a->inverse_mass;
@@ -117,8 +117,8 @@ JFPX_HD constexpr void warm_start(const ManifoldRow& row, const PointRow* points
   if (!(row.rolling_impulse == Vec3{})) apply_torque<kFixed>(pair, row.rolling_impulse);
 }
 
-/// Rolling friction acts on the relative angular velocity in the tangent plane, spinning friction
-/// on that about the normal. The torques are limited by a length times the normal impulse.
+/// Rolling friction opposes the relative angular velocity in the tangent plane, spinning friction
+/// that about the normal. The torques are limited by a length times the normal impulse.
 template <bool kFixed>
 JFPX_HD inline void solve_rolling(ManifoldRow* row, const PointRow* points, const BodyPair& pair) {
   Mat3 response = *pair.inertia_a;
@@ -154,8 +154,8 @@ JFPX_HD inline void solve_friction(const ManifoldRow& row, PointRow* points, con
     const Real limit = row.friction * p.normal_impulse;
     Real size2 = x * x + y * y;
     if (size2 > limit * limit) {
-      // A sliding point is solved with the same mass for all tangents: with unequal masses, its
-      // friction would not come to oppose the velocity, and points would hold each other.
+      // A sliding point uses the same mass for all tangents. With unequal masses, its friction
+      // would not become opposite to the velocity, and the points would block each other.
       x = p.friction_x - p.slip_mass * vx, y = p.friction_y - p.slip_mass * vy;
       size2 = x * x + y * y;
       if (size2 > limit * limit) {
@@ -194,9 +194,10 @@ JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, cons
   }
 }
 
-/// One iteration over all points: friction first, because the normal impulse matters more. Friction
-/// is not solved in the bias sweep, whose push-out it would couple to the tangents: pyramids of
-/// boxes would keep oscillating. The points of a manifold act on each other, and a second pass over
+/// One iteration over all points: friction first, because the normal impulse matters more. The bias
+/// sweep does not solve friction, which would couple the push-out to the tangents: pyramids of
+/// boxes would keep oscillating. The points of a manifold are coupled, so a second pass over them
+/// nearly solves them together.
 /// them nearly solves them together.
 template <bool kFixed>
 JFPX_HD inline void solve(ManifoldRow* row, PointRow* points, const BodyPair& pair,

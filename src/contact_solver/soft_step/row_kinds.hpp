@@ -17,15 +17,15 @@ namespace soft_step {
 
 /// All types of rows. Rows of the overflow are solved in this order of kinds. A type has:
 ///   - `a`, `b`: its bodies, of which a is movable;
-///   - `Part`: type of what a row has several of, or NoPart. A row with parts has the index `first`
-///     of its first one, and their number `count`;
+///   - `Part`: type of the repeated parts of a row, or NoPart. A row with parts has the index
+///     `first` of its first part, and their number `count`;
 ///   - `kReadsRotation`: whether a row reads and changes SolverBody::rotation; `kReadsOrientation`:
-///     whether it reads the orientations of its bodies at the moment of a sweep;
-///   - RowSetup::fill() from a contact or a joint, and RowSetup::store() back to it: what it keeps
-///     from step to step, and what a snapshot has;
+///     whether it reads the orientations of its bodies at the time of a sweep;
+///   - RowSetup::fill() from a contact or a joint, and RowSetup::store() back to it. The stored
+///     values are kept for the next step and in snapshots;
 ///   - run() of each operation in row_operations.hpp;
-///   - if it is not SphereRow, store_changes().
-/// Rows of joints are the last ones, in the order of the alternatives of Joint.
+///   - store_changes(), except SphereRow.
+/// Rows of joints are last, in the order of the alternatives of Joint.
 using RowTypes = std::tuple<SphereRow, ManifoldRow, DistanceRow>;
 
 /// Index of a type in RowTypes.
@@ -60,8 +60,8 @@ JFPX_HD constexpr decltype(auto) visit_row(RowKind kind, const F& f) {
   return f(std::type_identity<std::tuple_element_t<kFirst, RowTypes>>());
 }
 
-/// Groups of rows, which a sweep solves one after the other: contacts and joints without a color,
-/// those of each color, and those with an immovable or kinematic body or with the world.
+/// Groups of rows, which a sweep solves one after the other: rows without a color, rows of each
+/// color, and rows with an immovable or kinematic body or with the world.
 inline constexpr std::uint32_t kGroups = kColors + 2u;
 inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
 JFPX_HD constexpr std::uint32_t group_of_color(std::uint32_t color) { return 1 + color; }

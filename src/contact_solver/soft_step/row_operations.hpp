@@ -1,8 +1,8 @@
 /// Operations of the sweeps of a soft step on one row of any kind.
 ///
 /// `kChangesRow`: the operation changes fields of the row. `kMovesBodies`: it changes the shift,
-/// the rotation or the free motion of bodies. A device writes nothing else back; the CPU ignores
-/// both.
+/// the rotation or the free motion of bodies. A device stores only what these flags select; the CPU
+/// ignores the flags.
 #pragma once
 
 #include "src/contact_solver/soft_step/row_setup.hpp"
@@ -15,12 +15,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// What an operation uses besides the row.
+/// Arguments of an operation besides the row.
 /// @tparam Part    Row::Part
-/// @tparam Impacts ImpactBodies, or a type that rebound() can use in its place
+/// @tparam Impacts ImpactBodies, or a type with the same interface for rebound()
 template <class Part, class Impacts>
 struct RowContext {
-  BodyPair bodies;         ///< without what the row does not read
+  BodyPair bodies;         ///< members that the row does not read are not set
   Part* parts;             ///< of the row; null for NoPart
   const Impacts* impacts;  ///< may be null for a row that does not rebound in a sweep
   PairOrientations orientations = {};
@@ -61,7 +61,7 @@ struct Solve {
   }
 };
 
-/// Spheres have rebounded in the substeps, and joints do not.
+/// Restitution of manifolds. Spheres have rebounded in the substeps; joints do not rebound.
 struct Restitute {
   static constexpr bool kChangesRow = false, kMovesBodies = false;
   template <bool kFixed, class Impacts>
@@ -74,7 +74,7 @@ struct Restitute {
   JFPX_HD void run(DistanceRow*, const RowContext<NoPart, Impacts>&) const {}
 };
 
-/// What every type of RowTypes has; see there.
+/// Concept of the types in RowTypes, which documents the requirements.
 template <class Row>
 concept RowType = requires(Row row, typename Row::Part* parts, const RowSetup& setup,
                            const RowContext<typename Row::Part, ImpactBodies>& context,

@@ -1,4 +1,4 @@
-/// Setup of the rows of a soft step from its contacts, and the impulses that contacts keep.
+/// Setup of the rows of a soft step from its contacts, and storage of their impulses.
 #pragma once
 
 #include <jfpx/material.hpp>
@@ -33,17 +33,17 @@ struct BodyProperties {
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
   MaterialSettings rules;
   const Vec3* position = nullptr;     ///< [m]
-  const Quat* orientation = nullptr;  ///< on the CPU, at this moment of the step
+  const Quat* orientation = nullptr;  ///< on the CPU, at the time of the sweep
 };
 
-/// Makes rows of contacts and joints. A row has the bodies in the order of a movable body a.
-/// Contacts and joints are numbered together: first the contacts, then the slots of joints.
+/// Builds rows of contacts and joints. Body a of a row is movable. Contacts and joints are numbered
+/// together: first the contacts, then the slots of joints.
 struct RowSetup {
   ContactView contacts;
   JointView joints;
   BodyProperties properties;
-  /// By body. Its velocities are those before the accelerations of the step during fill() only: on
-  /// the CPU, the substeps change this array.
+  /// By body. During fill(), the velocities are those before the accelerations of the step. Later,
+  /// the substeps on the CPU change this array.
   const SolverBody* start = nullptr;
   Real restitution_threshold = 0;  ///< StepConstants::restitution_threshold
 
@@ -61,27 +61,27 @@ struct RowSetup {
       contacts.colors[i] = color;
     }
   }
-  /// Place in the order of the rows of a body with fixed bodies: joints precede contacts, which are
-  /// solved last, because they must not be passed.
+  /// Sort key of the rows of a body with fixed bodies. Joints precede contacts, which are solved
+  /// last, because they must not be violated.
   JFPX_HD std::uint32_t fixed_order(std::uint32_t i) const {
     return is_joint(i) ? joint_of(i) : joints.count + i;
   }
 
-  /// Whether body b of a contact or joint becomes body a of its row, which must be movable.
+  /// Whether the row exchanges the bodies of a contact or joint, because body a must be movable.
   JFPX_HD bool is_flipped(const ContactKey& key) const { return !is_movable(key.a); }
-  /// Body a of its row.
+  /// Body a of the row of a contact or joint.
   JFPX_HD std::uint32_t movable_body(const ContactKey& key) const {
     return is_flipped(key) ? key.b : key.a;
   }
 
-  /// Kind of the row of a contact, which may differ from that of the contact: two balls with
-  /// rolling friction have a row of a manifold, and a ball on a fixed box has a row of spheres.
+  /// Kind of the row of a contact, which may differ from the kind of the contact: two balls with
+  /// rolling friction have a ManifoldRow, and a ball on a fixed box has a SphereRow.
   /// @returns kNoRow if no body is movable and awake, or if a movable body sleeps
   JFPX_HD RowKind kind_of(std::uint32_t contact) const {
     if (is_joint(contact)) return joint_kind(joint_of(contact));
     const ContactKey& key = contacts.key(contact);
     const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
-    // A body that is still asleep is near, but does not touch: the contact has no effect.
+    // A body that is still asleep does not touch the other body: the contact has no effect.
     if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return kNoRow;
     // The arms of a generated contact are not multiples of the normal.
     if (contacts.impulse_count(contact) != 1 || key.is_generated()) return kKindOf<ManifoldRow>;
@@ -95,9 +95,8 @@ struct RowSetup {
     return color == kOverflowColor ? kOverflowGroup : group_of_color(color);
   }
 
-  /// Speed of separation after an impact, or 0. The speed of the impact is that at the start of the
-  /// step and what the bodies gain on the way, because impulses end the motion in the middle of a
-  /// step.
+  /// Rebound speed after an impact, or 0. The speed of the impact is that at the start of the step
+  /// plus the gain until the impact; impulses end the motion in the middle of a step.
   /// @param velocity of a's point relative to b's, at the start of the step
   JFPX_HD Real rebound_speed(const Vec3& velocity, const Vec3& normal, Real distance,
                              std::uint32_t a, std::uint32_t b, Real restitution) const {
@@ -125,7 +124,7 @@ struct RowSetup {
     row->b = flipped ? key.a : key.b;
     row->normal = flipped ? -normal : normal;
     row->distance = distance;
-    // Penetrating spheres share the middle of the overlap, so that angular momentum is conserved.
+    // Penetrating spheres share the middle of the overlap, which conserves angular momentum.
     const Real half_overlap = distance < 0 ? distance * Real(0.5) : Real(0);
     row->arm_a = properties.radius[row->a] + half_overlap;
     row->arm_b = kFixed ? Real(0) : properties.radius[row->b] + half_overlap;
@@ -254,7 +253,7 @@ struct RowSetup {
   }
 
  private:
-  /// As kind_of().
+  /// kind_of() for joints.
   JFPX_HD RowKind joint_kind(std::uint32_t joint) const {
     if (!joints.is_used(joint)) return kNoRow;
     const ContactKey key = joints.key(joint);
@@ -263,7 +262,7 @@ struct RowSetup {
     if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return kNoRow;
     return kind_of_joint(joints.inputs[joint].type);
   }
-  /// The friction impulse of the last step, whose normal was another one.
+  /// Projects the friction impulse of the last step, which had another normal.
   JFPX_HD static Vec3 in_tangent_plane(const Vec3& friction, const Vec3& normal) {
     return friction - normal * dot(friction, normal);
   }

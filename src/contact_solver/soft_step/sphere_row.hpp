@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 
 /// Aligned, so that a device reads and writes it in few accesses. A sweep changes only the fields
-/// before `normal`, and `restitution`: device::SolveProgram::store() writes no others back.
+/// before `normal`, and `restitution`: device::SolveProgram::store() writes only these.
 struct alignas(4 * sizeof(Real)) SphereRow {
   using Part = NoPart;
   static constexpr bool kReadsRotation = false, kReadsOrientation = false;
@@ -76,7 +76,7 @@ JFPX_HD constexpr Vec3 relative_velocity(const SphereRow& row, const SolverBody&
   return velocity - cross(spin, row.normal);
 }
 
-/// [m], at this moment of the step.
+/// [m], at the time of the sweep.
 template <bool kFixed>
 JFPX_HD constexpr Real separation_of(const SphereRow& row, const SolverBody& a,
                                      const SolverBody& b) {
@@ -91,7 +91,7 @@ JFPX_HD inline void warm_start(const SphereRow& row, SolverBody* a, SolverBody* 
                 row.friction_impulse, a, b);
 }
 
-/// What an impact needs of the bodies, as arrays by body.
+/// Data of the bodies for impacts, as arrays by body.
 struct ImpactBodies {
   const Vec3* acceleration = nullptr;  ///< [m/s^2], of movable bodies in this step
   FreeMotion* free = nullptr;
@@ -101,8 +101,8 @@ struct ImpactBodies {
   }
 };
 
-/// Rebounds of a contact in a step. A light body between heavy ones meets them again and again; the
-/// impulses that are kept must carry them.
+/// Maximum number of rebounds of a contact in a step. A light body between heavy bodies collides
+/// with them repeatedly; the stored impulses must support the heavy bodies.
 inline constexpr int kMaxRebounds = 4;
 
 /// Number of rebounds in this step.
@@ -110,15 +110,15 @@ JFPX_HD constexpr int rebounds_of(const SphereRow& row) {
   return static_cast<int>(row.restitution * Real(0.5));
 }
 
-/// Makes the bodies rebound if they meet faster than the accelerations and the loss of the kept
-/// impulse could make them. They get the velocities after the impact, and the positions as if they
-/// had these since the impact. The impulse acts once: it is neither kept in the row nor repeated by
-/// the next substep, so that a body may meet several others in a step.
+/// Makes the bodies rebound if their closing speed exceeds what accelerations and the loss of the
+/// stored impulse can cause. The bodies get the velocities after the impact, and positions as if
+/// they had moved with these velocities since the impact. The impulse acts once: it is neither
+/// stored in the row nor repeated by the next substep, so a body may hit several bodies in a step.
 /// @param bodies     ImpactBodies, or a type with the same `acceleration` and add()
-/// @param separation [m], at the start of the motion that is left in the substep
-/// @param left       [s], duration of that motion
+/// @param separation [m], at the start of the rest of the motion in the substep
+/// @param left       [s], duration of that rest
 /// @param velocity   of a's point of contact relative to b's, at the end of the substep
-/// @param closing    [m/s], < 0, its part along the normal
+/// @param closing    [m/s], < 0, component of `velocity` along the normal
 /// @returns whether the bodies rebound
 template <bool kFixed, class Impacts>
 JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impacts& bodies,
@@ -134,7 +134,7 @@ JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impa
     largest += length(bodies.acceleration[row.b]);
   }
   if (!(-closing > largest * step.h + normal_impulse_of(row) / row.normal_mass)) return false;
-  // Time until the impact; negative if it is past, and at most a substep ago.
+  // Time until the impact; negative for an impact in the past, at most one substep ago.
   Real until = separation / -closing;
   if (until < -step.h) until = -step.h;
   const Real gained = dot(acceleration, row.normal) * (until > 0 ? left - until : left);
@@ -160,7 +160,7 @@ JFPX_HD inline bool rebound(SphereRow* at, const StepConstants& step, const Impa
   return true;
 }
 
-/// [-], penetration in parts of the smaller radius from which StepConstants::deep_balls holds.
+/// [-], penetration per smaller radius from which StepConstants::deep_balls applies.
 inline constexpr Real kDeepPenetration = Real(0.03);
 
 template <bool kFixed>

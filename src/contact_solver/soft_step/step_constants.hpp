@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Sweeps over the rows in a substep: one with bias, and relax sweeps without.
+/// Sweeps over the rows per substep: one bias sweep, and relax sweeps without bias.
 inline constexpr std::uint32_t kRelaxSweeps = 1, kSweepsPerSubstep = 1 + kRelaxSweeps;
 
 /// A contact as a damped spring whose coefficients depend on the substep, so that it is stable for
@@ -15,7 +15,7 @@ inline constexpr std::uint32_t kRelaxSweeps = 1, kSweepsPerSubstep = 1 + kRelaxS
 struct Softness {
   Real bias_rate = 0;      ///< [1/s], push-out velocity per penetration
   Real mass_scale = 1;     ///< [-], weight of the velocity error
-  Real impulse_scale = 0;  ///< [-], part of the accumulated impulse that relaxes
+  Real impulse_scale = 0;  ///< [-], fraction of the accumulated impulse that relaxes
 };
 
 /// @param hertz   [Hz], frequency of the spring, > 0
@@ -29,31 +29,31 @@ JFPX_HD constexpr Softness make_softness(Real hertz, Real damping, Real h) {
   return {omega / a1, a2 * a3, a3};
 }
 
-/// Values that all contacts of a step share.
+/// Constants of all contacts of a step.
 struct StepConstants {
   Real h = 0;           ///< [s], length of a substep
   Real inverse_h = 0;   ///< [1/s]
   Softness movable;     ///< between two movable bodies
   Softness balls;       ///< between two movable spheres, in a SphereRow
-  Softness deep_balls;  ///< the same, for penetrations that heaps at rest do not have
+  Softness deep_balls;  ///< between two movable spheres, for deep penetrations
   Softness fixed;       ///< between a movable and an immovable or kinematic body
-  /// [m/s], of a push-out by velocity and projection together, and of joints by projection
+  /// [m/s], push-out by velocity and projection together, and projection of joints
   Real push_out_speed = 0;
-  /// [m/s], of a push-out by velocity. The relax sweep removes most of it from the velocities, but
-  /// not all of it in chains of overlapping bodies, which would fly apart at a higher speed.
+  /// [m/s], push-out by velocity. The relax sweep removes most of it from the velocities, but not
+  /// all in chains of overlapping bodies, which would fly apart at a higher speed.
   Real max_bias_velocity = 0;
   Real restitution_threshold = 0;  ///< [m/s], slower contacts do not bounce
 };
 
-/// Factors of the damping ratio between movable spheres. With less, layers at the bottom of deep
-/// heaps keep creeping; pyramids of boxes would keep oscillating with more. Deep penetrations, as
-/// of bodies that overlap at the start, are pushed out faster with the second one.
+/// Factors of the damping ratio between movable spheres. A lower factor lets layers at the bottom
+/// of deep heaps creep; a higher factor lets pyramids of boxes oscillate. The second factor pushes
+/// out deep penetrations faster, for example of bodies that overlap at the start.
 inline constexpr Real kSphereDamping = 6, kDeepSphereDamping = 2;
-/// A push-out by velocity has at most the push-out speed divided by this.
+/// The push-out by velocity is limited to the push-out speed divided by this value.
 inline constexpr Real kBiasSpeedDivisor = 6;
 
-/// Frequencies are limited to a quarter of the substep rate, and twice that for fixed bodies: a
-/// faster spring would not be resolved by the substeps.
+/// Frequencies are limited to a quarter of the substep rate, and to half of it for fixed bodies:
+/// substeps cannot resolve faster springs.
 JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& settings, Real dt) {
   const Real h = dt / static_cast<Real>(settings.substeps);
   const Real inverse_h = static_cast<Real>(settings.substeps) / dt;
@@ -87,9 +87,9 @@ struct alignas(16 * sizeof(Real)) SolverBody {
 };
 static_assert(sizeof(SolverBody) == 16 * sizeof(Real));
 
-/// Velocities of a body without the contact impulses of the current substep: those after its
-/// accelerations. The next substep adds what contacts have changed since, as a warm start. A
-/// rebound changes these velocities, too, so that it is not applied again.
+/// Velocities of a body without the contact impulses of the current substep, after its
+/// accelerations. The next substep adds the change by contacts again, as a warm start. A rebound
+/// also changes these velocities, so that it is not applied again.
 struct FreeMotion {
   Vec3 velocity, angular_velocity;
 
@@ -102,17 +102,17 @@ struct FreeMotion {
 /// Velocity along the normal that a contact must reach, and the weights of its impulse.
 struct Bias {
   Real velocity, mass_scale, impulse_scale;
-  Real projection;  ///< [m], >= 0: distance by which the bodies are moved apart, without velocity
+  Real projection;  ///< [m], >= 0: distance to separate the bodies without changing velocities
 };
 
-/// Whether a relax sweep skips a contact. A speculative contact (separation > 0) is solved in the
-/// bias sweep, before positions are integrated. A relax sweep solves only those that have an
-/// impulse: the others would push apart bodies that have not met.
+/// Whether a relax sweep skips a contact. The bias sweep, before positions are integrated, solves a
+/// speculative contact (separation > 0). A relax sweep skips speculative contacts without an
+/// impulse: otherwise it would push apart bodies that do not touch.
 JFPX_HD constexpr bool is_idle(Real separation, Real normal_impulse, bool use_bias) {
   return !use_bias && separation > 0 && !(normal_impulse > 0);
 }
 
-/// A separated contact may close its gap within the substep (speculative contact). With bias, a
+/// A speculative contact (separation > 0) may close its gap within the substep. With bias, a
 /// penetration is pushed out: by velocity up to max_bias_velocity, and by projection beyond it.
 /// @param separation [m] at this substep
 JFPX_HD constexpr Bias bias_of(Real separation, const Softness& softness, const StepConstants& step,

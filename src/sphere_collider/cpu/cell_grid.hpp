@@ -44,7 +44,7 @@ class CellAxis {
   /// at most half the largest Real.
   void fit(Real low, Real middle, Real high, Real distance);
   /// Renumbers the cells so that a gap of any number of empty cells becomes one empty cell. For
-  /// worlds that are so wide that the product of three counts would overflow.
+  /// very wide worlds, in which the product of three counts would overflow.
   void skip_empty_cells(const SphereSubset& targets, int axis);
   /// Merges pairs of cells. Neighbours stay neighbours.
   void halve();

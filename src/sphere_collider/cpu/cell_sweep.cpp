@@ -21,7 +21,7 @@ constexpr int kBinShift = std::numeric_limits<Real>::digits - 1 - 2;
 constexpr std::size_t kBins = std::size_t{1} << (sizeof(Real) * 8 - 1 - kBinShift);
 
 /// Number of bins of a class. Wide classes need fewer sorts, but a wide class of small spheres with
-/// a large one among them has many spheres per cell. Such classes are narrowed.
+/// one large sphere has many spheres per cell. Such classes are narrowed.
 constexpr std::size_t kWidest = 16;
 constexpr std::size_t kNarrowest = 4;
 /// A class is narrowed if the average number of other targets in the cell of a sphere exceeds this.
@@ -31,7 +31,7 @@ constexpr double kDense = 8;
 /// 0.7.
 constexpr double kCrowded = 2;
 constexpr Real kOneBin =
-    Real(1.5);  ///< no bins are made up to this ratio of largest to smallest radius
+    Real(1.5);  ///< maximum ratio of largest to smallest radius for a single bin
 
 constexpr Real kLargest = std::numeric_limits<Real>::max();
 
@@ -49,7 +49,7 @@ std::size_t queries_per_chunk(std::size_t queries) {
   return std::max<std::size_t>(2048, (queries + 1023) / 1024);
 }
 
-/// Makes the rows around the cell of a query: all nine, or, if `half`, only its own row and the
+/// Computes the rows around the cell of a query: all nine or, if `half`, only its own row and the
 /// four rows with higher numbers, so that each pair is found once.
 int make_rows(const CellGrid& grid, bool half, std::array<CellRow, kRows>* rows) {
   int count = 0;
@@ -157,7 +157,7 @@ double CellSweep::others_per_cell(const SphereTable& table, ThreadPool& pool) {
     std::uint64_t pairs = in_cell;
     for (std::size_t i = first + 1; i < last; ++i) {
       const std::uint64_t same = cell[i] == cell[i - 1] ? 1 : 0;
-      in_cell = (in_cell + 1) & (0 - same);  // no branch, which would be unpredictable
+      in_cell = (in_cell + 1) & (0 - same);  // branch-free: a branch would be unpredictable
       pairs += in_cell;
     }
     return pairs;

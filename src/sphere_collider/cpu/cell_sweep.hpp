@@ -17,13 +17,13 @@ namespace cpu {
 /// smallest, the spheres of the class (targets) are sorted by cell and tested against each other
 /// and against all smaller spheres (queries), which are sorted by the same cells. The neighbours of
 /// a query lie in nine rows of three consecutive cells, and therefore in nine runs of the sorted
-/// targets. The begin of each run only moves forward as the queries advance. There is no table of
-/// cells, so time and memory do not depend on the extent of the world or on how much of it is
-/// empty. The number of disjoint spheres of one class in one cell is bounded, so the work is O(N
-/// log N + contacts) for each class that occurs.
+/// targets. As the queries advance, the beginning of each run only moves forward. There is no table
+/// of cells, so time and memory depend neither on the extent of the world nor on empty space. The
+/// number of disjoint spheres of one class in one cell is bounded, so the work is O(N log N +
+/// contacts) per class.
 class CellSweep {
  public:
-  /// Adds every pair that touches to `pairs` in new chunks, once. Returns the order of these pairs.
+  /// Appends every touching pair once to `pairs`, in new chunks. Returns the order of these pairs.
   PairOrder find_pairs(std::span<const SphereInstance> spheres, const Kernels& kernels,
                        ThreadPool& pool, PairChunks* pairs);
 

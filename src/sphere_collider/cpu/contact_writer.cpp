@@ -19,7 +19,7 @@ std::uint32_t lower(std::uint64_t pair) { return static_cast<std::uint32_t>(pair
 std::uint32_t higher(std::uint64_t pair) { return static_cast<std::uint32_t>(pair); }
 SpherePair unpacked(std::uint64_t pair) { return {lower(pair), higher(pair)}; }
 
-constexpr unsigned kPartBits = 10;       ///< bits of the rows per part of the result, at least
+constexpr unsigned kPartBits = 10;       ///< minimum bits of the rows per part of the result
 constexpr std::size_t kRowsAhead = 8;    ///< prefetch distance: rows are read in random order
 constexpr std::size_t kPairsAhead = 16;  ///< prefetch distance: so are spheres
 
@@ -43,9 +43,9 @@ void sort_long_row(SpherePair* row, SpherePair* spare, std::size_t count) {
   if (row != home) std::copy_n(row, count, home);
 }
 
-/// Writes a row of at most `Capacity` pairs sorted: counts, for each, the lower ones. The order of
-/// a row is random, so branches on comparisons would be unpredictable; these loops have none, and
-/// compilers vectorize them.
+/// Writes a row of at most `Capacity` pairs sorted: the position of a pair is the number of lower
+/// pairs. The order of a row is random, so branches on comparisons would be unpredictable; these
+/// loops are branch-free, and compilers vectorize them.
 template <std::size_t Capacity>
 void sort_by_rank(const std::uint64_t* row, std::size_t count, SpherePair* sorted) {
   // Signed, because baseline instructions have no unsigned comparison.
@@ -62,7 +62,7 @@ void sort_by_rank(const std::uint64_t* row, std::size_t count, SpherePair* sorte
   for (std::size_t i = 0; i < count; ++i) sorted[ranks[i]] = unpacked(row[i]);
 }
 
-/// The same for `Count` pairs in registers.
+/// Writes a sorted row of `Count` pairs, in registers.
 template <std::size_t Count>
 void sort_few(const std::uint64_t* row, SpherePair* sorted) {
   std::size_t ranks[Count] = {};
@@ -98,13 +98,13 @@ void sort_row(const std::uint64_t* row, std::size_t count, SpherePair* sorted,
   std::sort(sorted, sorted + count, less_in_row);
 }
 
-/// The contact of a pair that touches.
+/// The contact of a touching pair.
 SphereContact contact_of(const SphereInstance* spheres, const SpherePair& p) {
   const PairResult r = detail::test_sphere_pair(spheres[p.a], spheres[p.b]);
   return {p.a, p.b, r.normal, r.distance};
 }
 
-/// The contacts of kRealLanes pairs that touch.
+/// The contacts of kRealLanes touching pairs.
 void write_contact_lanes(const SphereInstance* spheres, const SpherePair* pairs,
                          SphereContact* contacts) {
   const SphereLanes a = gather_spheres(spheres, pairs, &SpherePair::a);
@@ -144,7 +144,7 @@ std::span<const Item> ContactWriter::write_chunks(const PairChunks& chunks, Thre
 }
 
 /// Writes pairs in parts of consecutive rows. Calls reserve(total) before the first part, and
-/// done(pairs) after each, while it is in the cache.
+/// done(pairs) after each part, while it is in the cache.
 template <class Reserve, class Done>
 std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const PairChunks& chunks,
                                                       PairOrder order, ThreadPool& pool,
@@ -250,7 +250,7 @@ unsigned ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres
   return kPartBits;
 }
 
-/// Makes as many workspaces as threads may need. Only a long row grows one later.
+/// Creates a workspace for each thread. Only a long row grows a workspace later.
 /// @param rows number of rows of a part that make_rows() fills
 void ContactWriter::reserve_workspaces(std::size_t count, std::size_t rows, std::size_t parts) {
   std::uint64_t most = 0;
@@ -298,12 +298,12 @@ const ContactWriter::Row* ContactWriter::make_rows(std::size_t bucket, std::size
   return rows;
 }
 
-/// Divides pairs into buckets of neighbouring lower spheres, so that the rest stays in the cache of
-/// one core. Fills sections_, and pairs_ with the bits of packed pairs. Returns the bits of the
+/// Divides pairs into buckets of neighbouring lower spheres, so that later passes stay in the cache
+/// of one core. Fills sections_, and pairs_ with the bits of packed pairs. Returns the bits of the
 /// size of a bucket.
 unsigned ContactWriter::divide(const PairChunks& chunks, std::size_t spheres, ThreadPool& pool) {
   const auto bits = static_cast<unsigned>(std::bit_width(spheres));
-  // At most 256 buckets: streams that fit in the TLB.
+  // At most 256 buckets, whose streams fit in the TLB.
   const unsigned bucket_bits = bits > 18 ? bits - 8 : kPartBits;
   const std::size_t buckets = (spheres >> bucket_bits) + 1;
   offsets_.reserve(chunks.size() * buckets, "counts of pairs");

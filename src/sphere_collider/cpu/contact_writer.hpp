@@ -14,8 +14,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 
-/// Writes pairs or contacts sorted by (a, b). Owns its buffers, which only grow. A result is valid
-/// until the next call.
+/// Writes pairs or contacts sorted by (a, b). Owns its buffers, which grow and never shrink. A
+/// result is valid until the next call.
 class ContactWriter {
  public:
   /// @param chunks touching pairs, each once
@@ -30,7 +30,7 @@ class ContactWriter {
     const std::uint64_t* pairs = nullptr;
     std::uint64_t count = 0;
   };
-  /// What a thread needs to sort a part of the result.
+  /// Buffers of a thread for sorting a part of the result.
   struct Workspace {
     Buffer<std::uint64_t> pairs;  ///< of the part, by lower sphere
     Buffer<Row> rows;             ///< of the part
@@ -63,7 +63,7 @@ class ContactWriter {
   Buffer<Row> rows_;                   ///< by lower sphere; for PairOrder::by_lower_sphere
   Buffer<std::uint64_t> offsets_;      ///< per chunk and bucket
   std::vector<Workspace> workspaces_;  ///< by thread
-  std::vector<Workspace*> idle_;       ///< those that no thread has
+  std::vector<Workspace*> idle_;       ///< unused workspaces
   std::mutex mutex_;                   ///< guards idle_
 };
 

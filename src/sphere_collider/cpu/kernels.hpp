@@ -2,10 +2,10 @@
 #pragma once
 
 // Only macros, types and declarations may be included here, because the sources of the kernels are
-// compiled for instruction sets that the processor may not support. An inline function that such a
-// source emits is a COMDAT symbol, of which the linker keeps one copy for the whole program,
-// possibly that one. Therefore the sources of the kernels use neither standard containers nor Vec3,
-// and all their definitions have internal linkage.
+// compiled for instruction sets that the processor may not support. An inline function in such a
+// source is a COMDAT symbol: the linker keeps one copy for the whole program, possibly the copy of
+// that source. Therefore the sources of the kernels use neither standard containers nor Vec3, and
+// all their definitions have internal linkage.
 #include <jfpx/config.hpp>
 
 #include <cstdint>
@@ -58,7 +58,7 @@ struct CellRow {
   std::uint32_t cursor;
 };
 
-/// All functions append every pair that touches, and no others.
+/// All functions append every touching pair and no others.
 struct Kernels {
   /// Tests every query against every target. If `self`, pairs are ordered by the position of the
   /// first sphere, then of the second.
@@ -66,7 +66,7 @@ struct Kernels {
   /// Tests every query against the targets in its rows. If `self`, rows[0] is the row of the query
   /// itself, starting at its own cell.
   void (*search_rows)(const PairSearch& search, CellRow* rows, int row_count);
-  /// The same with all kRows rows, which takes less time if there are several queries in a cell. If
+  /// search_rows() with all kRows rows, which is faster if there are several queries in a cell. If
   /// `self`, the pairs of a lower sphere are consecutive.
   void (*search_cells)(const PairSearch& search, CellRow* rows);
 };

@@ -16,9 +16,9 @@
 //   count(mask)               number of set bits
 //   append(out, id, others, mask)  see append_bits(); may write kLanes elements
 
-// The test. It compares the values of detail::test_sphere_pair(): differences have the opposite
-// sign if the spheres are exchanged, which their squares do not depend on, and a sum of two radii
-// does not depend on the order.
+// The test. It compares the values of detail::test_sphere_pair(). Exchanging the spheres changes
+// the sign of the differences, but not their squares; the sum of two radii does not depend on the
+// order.
 
 // The filter, which takes no root. Let u = epsilon/2, R = r_a + r_b (exact), t = 2^-63 (float) or
 // 2^-511 (double), the square root of the smallest normal number; reach >= r*(1 + 6u) + t. A pair
@@ -31,7 +31,7 @@
 // not, len = inf > w >= s. Centres and radii are finite: differences may be infinite, their squares
 // are never negative, so no NaN arises.
 
-// Most pairs that are kept touch, which the squares can tell as well: a pair touches if I > D, with
+// Most kept pairs touch, and the squares can also show this: a pair touches if I > D, with
 //     I = fl(W - fl(fl(W*64u) + m)),   m = 128 t^2/u.
 // Since reach <= r*(1 + 15u) + 3t,
 //     W <= R^2 * (1 + 37u) + 16tR + 50t^2 <= R^2 * (1 + 41u) + 65t^2/u,
@@ -92,7 +92,7 @@ inline std::uint32_t touching(const Query<S>& q, const SphereColumns& t, std::ui
   return touching<S>(squares(q, t, at), q, t, at);
 }
 
-/// Returns the bits of `targets` that touch. Takes roots only if the squares do not decide.
+/// Returns the bits of `targets` that touch. Computes roots only if the squares do not decide.
 template <class S>
 inline std::uint32_t touching_among(std::uint32_t targets, const Query<S>& q,
                                     const SphereColumns& t, std::uint32_t at) {
@@ -114,7 +114,7 @@ class Appender {
   Appender(const Appender&) = delete;
   Appender& operator=(const Appender&) = delete;
 
-  /// Makes room for kRoom pairs.
+  /// Reserves room for kRoom pairs.
   void reserve() {
     if (end_ - next_ < kRoom) [[unlikely]] {
       sink_->next = next_;
@@ -193,8 +193,8 @@ template <class S>
 }
 
 /// Tests the targets in cells [low, high), starting at the cursor. Cells ascend, so each bound
-/// selects a prefix of each vector. This needs neither a table of cells nor an unpredictable
-/// branch. Requires room for one vector of pairs, and leaves the room for the rows that follow.
+/// selects a prefix of each vector, without a table of cells and without an unpredictable branch.
+/// Requires room for one vector of pairs, and preserves the room for the following rows.
 template <class S>
 inline void search_row(const Query<S>& q, const SphereColumns& t, std::int64_t low,
                        std::int64_t high, std::uint32_t* cursor, Appender* pairs) {
@@ -243,9 +243,9 @@ struct TargetRun {
   std::uint32_t begin, end;
 };
 
-/// Returns the targets in cells [low, high), starting at the cursor, which moves to the first.
-/// Cells ascend, so each bound selects a prefix of each vector. This needs neither a table of cells
-/// nor an unpredictable branch.
+/// Returns the targets in cells [low, high), starting at the cursor, which advances to the first.
+/// Cells ascend, so each bound selects a prefix of each vector, without a table of cells and
+/// without an unpredictable branch.
 template <class S>
 inline TargetRun find_run(const SphereColumns& t, std::int64_t low, std::int64_t high,
                           std::uint32_t* cursor) {
@@ -295,7 +295,7 @@ struct NearTargets {
       }
       end += run.end - run.begin;
     }
-    // A vector after the last target is read.
+    // Vectors read beyond the last target.
     S::store(x + end, S::set(0));
     S::store(y + end, S::set(0));
     S::store(z + end, S::set(0));
@@ -309,8 +309,8 @@ struct NearTargets {
   alignas(64) std::uint32_t id[kSize];
 };
 
-/// The queries of a cell have the same targets, which are copied together unless there are many, so
-/// that vectors are full.
+/// The queries of a cell have the same targets. Few targets are copied together, so that vectors
+/// are full.
 template <class S>
 void search_cells(const PairSearch& search, CellRow* rows) {
   Appender pairs(search.sink);

@@ -28,8 +28,7 @@ struct Simd {
   static void copy_ids(const std::uint32_t* from, std::uint32_t* to) {
     __builtin_memcpy(to, from, kLanes * sizeof *to);
   }
-  /// Looks the number of set bits up in a table of nibbles, because SSE2 and NEON
-  /// have no instruction for it.
+  /// Counts set bits with a table of nibbles, because SSE2 and NEON have no such instruction.
   static std::uint32_t count(std::uint32_t mask) {
     return static_cast<std::uint32_t>(0x4332322132212110ull >> (4 * mask)) & 7;
   }

@@ -1,4 +1,4 @@
-/// The kernels without vector instructions: the reference for the others.
+/// The kernels without vector instructions: the reference for all other kernels.
 #include "src/sphere_collider/cpu/kernels.inl"
 
 namespace jfpx {

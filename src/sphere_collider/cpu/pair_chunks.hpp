@@ -19,7 +19,7 @@ enum class PairOrder : std::uint8_t {
 };
 
 /// Each chunk has its own buffer, so that threads share no data and the result does not depend on
-/// their timing. Buffers are kept for the next search.
+/// their timing. Buffers are reused by the next search.
 class PairChunks {
  public:
   void clear() noexcept { used_ = 0; }

@@ -72,10 +72,10 @@ inline unsigned touching_lanes(const SphereInstance* spheres, const SpherePair* 
 }
 static_assert(sizeof(SphereInstance) == 4 * sizeof(Real));
 
-/// Writes the ascending indices of all pairs that touch, and of a few more at the end of the list,
-/// to `found`, which must have room for `count` indices. The filter compares the same values as the
-/// exact test, with the same roundings. It does not branch on the result, which is unpredictable in
-/// lists that mix pairs that touch with pairs that do not.
+/// Writes the ascending indices of all touching pairs to `found`, possibly with a few further
+/// indices from the end of the list. `found` must have room for `count` indices. The filter
+/// compares the same values as the exact test, with the same roundings. It does not branch on the
+/// result, which is unpredictable in lists that mix touching and separated pairs.
 /// @return the number of indices
 inline std::size_t find_candidates(const SphereInstance* spheres, const SpherePair* pairs,
                                    std::size_t count, std::uint32_t* found) {

@@ -10,7 +10,7 @@ inline namespace JFPX_ABI {
 namespace cpu {
 
 BackendStatus probe();
-/// @param pool null: the collider has options.threads threads of its own
+/// @param pool null: the collider creates options.threads threads
 std::unique_ptr<SphereCollider> make_sphere_collider(const SphereColliderOptions& options,
                                                      ThreadPool* pool);
 

@@ -23,7 +23,7 @@ inline Real extended_radius(Real r) {
   return r * (1 + 6 * kEpsilon) + slack;
 }
 
-/// Owns the columns, which only grow.
+/// Owns the columns, which grow and never shrink.
 class SphereTable {
  public:
   /// Element i becomes sphere id_of(i) in cell cell_of(i).

@@ -16,8 +16,8 @@ constexpr unsigned kThreads = kTile;  // one per row
 constexpr unsigned kEmitThreads = 256;
 
 /// Tiles of a band. Row r of tiles has `tiles - r` tiles on and right of the diagonal. The first
-/// row of a band is paired with its last row, the second with the last but one, and so on. Then the
-/// two rows together always have width() tiles, and the tiles fill a rectangular grid of blocks.
+/// row of a band is paired with its last row, the second with the second to last, and so on. Each
+/// such pair has width() tiles, so the tiles fill a rectangular grid of blocks.
 struct TileGrid {
   std::uint32_t tiles, first, rows;
   __host__ __device__ std::uint32_t width() const { return 2 * (tiles - first) - rows + 1; }
@@ -54,7 +54,7 @@ __global__ void __launch_bounds__(kThreads) all_pairs(AllPairsArgs args) {
   std::uint32_t tile_column = tile_row + blockIdx.x;
   if (tile_column >= grid.tiles) {
     const std::uint32_t mirrored = grid.rows - 1 - blockIdx.y;
-    if (mirrored == blockIdx.y) return;  // an odd band: its middle row has no partner
+    if (mirrored == blockIdx.y) return;  // the middle row of an odd band has no partner
     tile_row = grid.first + mirrored;
     tile_column = tile_column - grid.tiles + tile_row;
   }
@@ -126,7 +126,7 @@ void launch_all_pairs(const AllPairsArgs& args, cudaStream_t stream) {
 
 void launch_mask_emit(const MaskEmitArgs& args, cudaStream_t stream) {
   constexpr unsigned kRowsPerBlock = kEmitThreads / 32;
-  // At least one block, because it also writes the count.
+  // At least one block, which also writes the count.
   const unsigned blocks = args.rows / kRowsPerBlock + (args.rows % kRowsPerBlock != 0 ? 1 : 0);
   launch(mask_emit, std::max(blocks, 1u), 1, kEmitThreads, stream, args);
 }

@@ -71,8 +71,8 @@ void DeviceSearch::reserve(std::size_t n, std::size_t contacts) {
   check_number_of_spheres(n);
   const DeviceGuard guard(device_);
   const std::size_t max_spheres = std::max(n, spheres_reserved_);
-  // A search of all pairs needs no memory for contacts, but a later reserve() of more spheres may
-  // select the grid, which must then have memory for all contacts requested so far.
+  // A search of all pairs needs no memory for contacts. A later reserve() of more spheres may
+  // select the grid, which then needs memory for all contacts requested so far.
   contacts = std::max(contacts, contacts_requested_);
   if (uses_grid(max_spheres)) {
     const std::size_t bytes = grid_scratch_bytes(max_spheres, contacts);

@@ -12,27 +12,28 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// The device. @throws BackendUnavailable, with the reason, before the first call of CUDA
+/// Returns the device; checks it before the first call of CUDA.
+/// @throws BackendUnavailable with the reason
 int usable_device(int device);
 
 /// Searches among spheres in device memory. Memory is allocated and freed in the order of the
-/// stream of the constructor; the caller orders that stream and those of the searches.
+/// stream of the constructor; the caller orders that stream and the streams of the searches.
 class DeviceSearch {
  public:
   /// @throws BackendUnavailable with the reason if the device cannot be used, DeviceError
   DeviceSearch(cudaStream_t stream, int device, SphereAlgorithm algorithm);
 
-  /// As DeviceSphereCollider::reserve().
+  /// See DeviceSphereCollider::reserve().
   void reserve(std::size_t n, std::size_t contacts);
   /// Whether memory is reserved for a search among n spheres.
   bool fits(std::size_t n) const { return n <= spheres_reserved_; }
-  /// @throws InvalidArgument if it is not
+  /// @throws InvalidArgument unless fits(n)
   void require_reserved(std::size_t n) const;
-  /// Whether a search among n spheres is one launch. Only such a search takes an input of arrays.
+  /// Whether a search among n spheres is one launch. Only such a search accepts an input of arrays.
   bool is_one_launch(std::size_t n) const;
   bool uses_grid(std::size_t n) const;
 
-  /// Enqueues a search, as DeviceSphereCollider::find_contacts().
+  /// Enqueues a search; see DeviceSphereCollider::find_contacts().
   /// @pre fits(input.n)
   void find(const SphereInput& input, const SearchOutput& output, cudaStream_t stream);
 

@@ -27,7 +27,7 @@ DeviceSphereCollider::DeviceSphereCollider(Stream stream, int device, SphereAlgo
 DeviceSphereCollider::~DeviceSphereCollider() {
   if (impl_ == nullptr) return;
   try {
-    const DeviceGuard guard(impl_->search.device());  // stream 0 is that of the current device
+    const DeviceGuard guard(impl_->search.device());  // stream 0 belongs to the current device
     impl_.reset();
   } catch (const DeviceError&) {
     impl_.reset();  // the device is lost

@@ -24,8 +24,8 @@ static_assert(kMaxTiles == 2 * kBlocks && kFusedSpheres == 2 * kThreads);
 
 using RowSums = cub::BlockScan<std::uint32_t, kThreads, cub::BLOCK_SCAN_WARP_SCANS>;
 
-// Functions and constants are [[maybe_unused]], because clusters require Hopper, so that the kernel
-// is empty in code for older devices.
+// Functions and constants are [[maybe_unused]]: clusters require Hopper, so the kernel is empty in
+// code for older devices.
 
 /// Shared memory of a block.
 struct FusedStorage {
@@ -39,9 +39,9 @@ struct FusedStorage {
   std::uint32_t valid_before[kWarps];  // ~(lowest index of an invalid sphere), 0 if there is none
 };
 
-/// The two rows of tiles that a block tests: one from the start, where rows are long, and one from
-/// the end, where they are short, so that blocks have equal work if n is kFusedSpheres. of_row(k)
-/// is the number of tiles of row k on and right of the diagonal.
+/// The two rows of tiles that a block tests: a long row from the start and a short row from the
+/// end, so that blocks have equal work if n is kFusedSpheres. of_row(k) is the number of tiles of
+/// row k on and right of the diagonal.
 struct TilesOfBlock {
   unsigned tiles, rows[2];
   __device__ TilesOfBlock(std::uint32_t n, unsigned block)
@@ -116,7 +116,7 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
   fill_words(tiles, s);
   __syncthreads();
 
-  // Each warp tests kRowsOfWarp rows of the bit matrix. Lane w keeps word w of each.
+  // Each warp tests kRowsOfWarp rows of the bit matrix. Lane w keeps word w of each row.
   const auto row = [&](unsigned k) {
     const unsigned local = k * kWarps + warp;
     return 32 * tiles.rows[local / 32] + local % 32;

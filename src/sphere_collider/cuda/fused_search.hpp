@@ -14,8 +14,8 @@ struct FusedArgs {
   SphereInput input;  ///< at most kFusedSpheres
   SearchOutput output;
 };
-/// Whether the current device can run the search: it requires clusters of 16 thread blocks, which
-/// Hopper supports, and code that was compiled for them.
+/// Whether the current device can run the search, which requires clusters of 16 thread blocks
+/// (Hopper) and code that was compiled for Hopper.
 bool fused_search_supported();
 /// Enqueues the search. Does not allocate or wait.
 void launch_fused_search(const FusedArgs& args, cudaStream_t stream);

@@ -1,7 +1,7 @@
 /// Grid search in several launches. A counting sort puts the spheres into the cells of a hierarchy
-/// of grids, and each sphere is tested against the spheres of neighboring cells. There are no world
-/// bounds and no cell size to choose, and radii may differ by any factor. Each phase is a launch
-/// with its own number of threads.
+/// of grids, and each sphere is tested against the spheres of neighboring cells. Neither world
+/// bounds nor a cell size are configured, and radii may differ by any factor. Each phase is a
+/// launch with its own number of threads.
 #include "src/sphere_collider/cuda/grid_build.cuh"
 #include "src/sphere_collider/cuda/grid_crowded.cuh"
 #include "src/sphere_collider/cuda/grid_emit.cuh"
@@ -33,7 +33,7 @@ __global__ void __launch_bounds__(kGridThreads) measure_phase(GridArgs args) {
 
 constexpr unsigned kPlanThreads = 1024;
 
-/// Samples the cells. The last block to finish makes the plan.
+/// Samples the cells. The last block to finish computes the plan.
 __global__ void __launch_bounds__(kPlanThreads) plan_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ BuildStorage storage;
@@ -159,9 +159,9 @@ __global__ void __launch_bounds__(kGridThreads) long_row_phase(GridArgs args, Se
   }
 }
 
-/// Launches a kernel with more shared memory than the default limit of a block. `max_bytes` must be
-/// the same for all launches on a device, because the limit is a property of the kernel that other
-/// threads may set at the same time.
+/// Launches a kernel with more shared memory than the default limit of a block. The limit is an
+/// attribute of the kernel that other threads may set at the same time, so `max_bytes` must be the
+/// same for all launches on a device.
 template <typename... Parameters, typename... Arguments>
 void launch_large(std::size_t max_bytes, std::size_t bytes, void (*kernel)(Parameters...),
                   unsigned blocks, unsigned threads, cudaStream_t stream,
@@ -187,9 +187,9 @@ void launch_sort(const GridArgs& args, const GridLimits& limits, cudaStream_t st
   } else {
     launch_partition<false>(args, max_bytes, stream);
   }
-  // If the spheres are distributed evenly, a coarse bucket has between n / coarse_buckets and twice
-  // as many. If n / coarse_buckets spheres do not fit into shared memory, none are copied to it,
-  // which leaves more of it for buckets.
+  // If the spheres are distributed evenly, a coarse bucket has n / coarse_buckets to twice as many
+  // spheres. If n / coarse_buckets spheres do not fit into shared memory, none are copied there,
+  // which leaves more shared memory for buckets.
   constexpr std::uint32_t kMaxBuckets = 8192, kMaxSpheres = (1 << 16) - 4;
   const std::uint32_t buckets = args.table.size / args.table.coarse_buckets,
                       spheres = args.input.n / args.table.coarse_buckets;

@@ -1,4 +1,4 @@
-/// Device functions that the phases of the grid search share: the plan of the cell table, and
+/// Device functions shared by the phases of the grid search: the plan of the cell table, and
 /// block-wide sums.
 #pragma once
 
@@ -69,16 +69,17 @@ __device__ inline std::uint32_t row_of_box(const LevelBox& box, std::int32_t y, 
   return box.base + yz * static_cast<std::uint32_t>(box.nx) - static_cast<std::uint32_t>(box.x0);
 }
 
-/// Layout of the cell table. It is dense if the cells of all levels between the lowest and the
-/// highest coordinates fit into the table and no sphere is far: then each cell has its own bucket,
-/// and rows follow rows, so that cells that are close in y and z are close in memory. Otherwise the
-/// first bucket of a row is hashed, and a bucket can hold spheres of several cells.
+/// Layout of the cell table. It is dense if no sphere is far and the cells of all levels between
+/// the lowest and the highest coordinates fit into the table. In a dense table, each cell has its
+/// own bucket, and rows are consecutive, so that cells that are close in y and z are close in
+/// memory. Otherwise the first bucket of a row is hashed, and a bucket can hold spheres of several
+/// cells.
 struct GridPlan {
   GridScale scale;
   bool dense;
   bool single;  ///< dense, and all spheres are on level 0
-  /// single, with more than kCrowded spheres a cube of the cell width on average, and a cell width
-  /// that local_filter.hpp allows
+  /// `single`, with more than kCrowded spheres per cube of the cell width on average, and a cell
+  /// width that local_filter.hpp supports
   bool crowded;
   bool equal_radii;  ///< of all spheres
   Real inverse_yz;   ///< inverse cell width of level 0, in y and z
@@ -114,9 +115,9 @@ struct GridPlan {
   }
 };
 
-/// The finest level in use: the first one on which a sphere shares its cell with about two others
-/// at most, estimated from a sample of all spheres. All smaller spheres are on this level, too.
-/// Sharing a cell costs little, whereas each level is searched once more for every smaller sphere.
+/// The finest level in use: the first level on which a sphere shares its cell with at most about
+/// two others, estimated from a sample of all spheres. All smaller spheres are also on this level.
+/// Sharing a cell costs little, whereas each level requires one more search per smaller sphere.
 __device__ inline int last_level(const SearchState& state, std::uint32_t n) {
   const auto smallest = static_cast<RealBits>(~state.smallest_half);
   const int finest = level_for(std::bit_cast<Real>(smallest), {half_0_of(&state)});
@@ -127,7 +128,7 @@ __device__ inline int last_level(const SearchState& state, std::uint32_t n) {
   return finest > 0 ? finest : 0;
 }
 
-/// Makes the plan of a search, which is equal in all blocks. Call from all threads of the block.
+/// Computes the plan of a search, which is equal in all blocks. Call from all threads of the block.
 __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
   if (threadIdx.x < 32) {
@@ -189,7 +190,7 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// Copies the plan that plan_phase() made. Call from all threads of the block.
+/// Copies the plan of plan_phase(). Call from all threads of the block.
 __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   static_assert(sizeof(GridPlan) % sizeof(std::uint32_t) == 0);
   const auto* const from = reinterpret_cast<const std::uint32_t*>(args.plan);
@@ -200,7 +201,7 @@ __device__ inline void copy_plan(const GridArgs& args, GridPlan& plan) {
   __syncthreads();
 }
 
-/// Range of items, without `past`.
+/// Range of items [first, past).
 struct Span {
   std::uint64_t first, past;
 };

@@ -1,9 +1,9 @@
 /// Search among many spheres, which are sorted into the cells of a hierarchy of grids.
 ///
-/// There are four variants. All write the same contacts:
+/// There are four variants, which write the same contacts:
 ///  - direct (grid_direct.cuh): up to kMaxDirect spheres of similar radius, not sorted;
-///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres, if
-///    the direct search, which the same kernel tries first, does not apply;
+///  - in one cooperative launch (grid_one_launch.cu): up to kMaxInOneLaunch spheres; the same
+///    kernel first tries the direct search;
 ///  - single-level (grid_single_level.cuh): more spheres, of similar radius, in several launches;
 ///    if they are crowded, a warp searches for several of them together (grid_crowded.cuh);
 ///  - multi-level (grid_search.cuh): more spheres, of any radii, in several launches.
@@ -23,7 +23,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Number of elements after the last sphere that a search reads, but does not use.
+/// Number of elements beyond the last sphere that a search reads and ignores.
 inline constexpr std::uint32_t kReadBeyond = 2;
 
 /// The pair a < b; `rank` counts the pairs of a in the order of discovery.
@@ -54,8 +54,8 @@ struct GridLimits {
   unsigned multiprocessors;
   unsigned resident_blocks;  ///< blocks of the search in one launch that can run at the same time
   std::size_t shared_bytes;  ///< largest amount of shared memory of a block
-  /// Largest number of blocks among which the table and the spheres are divided. It is not less
-  /// than resident_blocks, as a multiprocessor runs at most 8 blocks of 256 threads at a time.
+  /// Largest number of blocks that share the table and the spheres. It is not less than
+  /// resident_blocks, because a multiprocessor runs at most 8 blocks of 256 threads at a time.
   constexpr unsigned max_blocks() const { return multiprocessors * 16; }
 };
 /// @pre `device` is the current device. @throws DeviceError
@@ -97,7 +97,7 @@ struct GridArgs {
     std::uint32_t* very_long_rows;  ///< [capacity / kMaxLongRow + 1] a's with more pairs
     std::uint32_t* long_row_neighbors;  ///< [capacity] b's of both, by index in the output
   };
-  /// Arrays that share memory, because they are not in use at the same time: slots and slot_ids,
+  /// Arrays that share memory, because they are used at different times: slots and slot_ids,
   /// partitioned and partitioned_ids, neighbors, staging.
   struct Scratch {
     SphereInstance* slots;           ///< [kDirectSlots * n] slots of cells; null if n > kMaxDirect
@@ -117,7 +117,7 @@ struct GridArgs {
   std::uint32_t lanes = 1;    ///< threads per sphere in the search: a power of two
 };
 
-/// Number of bytes that the arrays of GridArgs::Scratch need.
+/// Number of bytes of the arrays of GridArgs::Scratch.
 std::size_t grid_scratch_bytes(std::size_t n, std::size_t capacity);
 /// The arrays of a search among n spheres, in `memory` of grid_scratch_bytes().
 GridArgs::Scratch grid_scratch(std::uint32_t n, unsigned char* memory);

@@ -1,5 +1,5 @@
-/// First phases of the grid search: validation and bounds of the spheres and a sample of the cells,
-/// for one or several launches, and the counting sort by cell for one launch.
+/// First phases of the grid search. For any number of launches: validation and bounds of the
+/// spheres, and a sample of the cells. For one launch: the counting sort by cell.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid.cuh"
@@ -23,9 +23,8 @@ __device__ inline std::uint64_t grid_thread() {
 }
 __device__ inline std::uint64_t all_threads() { return std::uint64_t{gridDim.x} * kGridThreads; }
 
-/// Returns true in the last block of the kernel that calls it, in which all earlier writes of the
-/// other blocks are visible. `blocks_passed` must be 0 initially. Call from all threads of the
-/// block.
+/// Returns true in the last block of the calling kernel, in which all earlier writes of other
+/// blocks are visible. `blocks_passed` must be 0 initially. Call from all threads of the block.
 __device__ inline bool is_last_block(std::uint32_t& blocks_passed) {
   __shared__ bool last;
   __threadfence();
@@ -36,7 +35,7 @@ __device__ inline bool is_last_block(std::uint32_t& blocks_passed) {
   return last;
 }
 
-/// Clears `bytes` bytes, and up to 15 more.
+/// Clears `bytes` bytes and up to 15 following bytes.
 __device__ inline void clear(void* data, std::size_t bytes) {
   uint4* const to = static_cast<uint4*>(data);
   const std::size_t count = (bytes + sizeof(uint4) - 1) / sizeof(uint4);
@@ -113,9 +112,9 @@ __device__ inline bool needs_sample(const SearchState& state) {
   return level_for(smallest, {half_0_of(&state)}) > 0;
 }
 
-/// Counts, for each level but the finest, the pairs of sampled spheres that share a cell if that
-/// level is the last one. A block counts a level at a time, in a hash table: a slot holds 19 bits
-/// of the hash of a cell, and in the low 13 bits its number of spheres.
+/// Counts, for each level but the finest, the pairs of sampled spheres that would share a cell if
+/// that level were the last one. A block counts one level at a time, in a hash table. A slot holds
+/// 19 bits of the hash of a cell and, in the low 13 bits, its number of spheres.
 __device__ inline void sample_cells(const GridArgs& args, BuildStorage& s) {
   const GridScale all_levels{half_0_of(args.state)};
   const Real smallest = std::bit_cast<Real>(static_cast<RealBits>(~args.state->smallest_half));

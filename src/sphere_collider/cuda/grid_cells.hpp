@@ -14,9 +14,9 @@ namespace cuda {
 
 /// Finest level. Cells of level l are half as wide as those of level l - 1; cells of level 0 are as
 /// wide as the diameter of the largest sphere. A sphere is on the finest level whose cells are not
-/// narrower than its diameter; those more than 2^31 times smaller than the largest share the last
+/// narrower than its diameter; spheres more than 2^31 times smaller than the largest share the last
 /// level. A "far" sphere is so far from the origin that its coordinates are too coarse for cells of
-/// that level. It is on a wider level, whose number can be negative.
+/// that level. A far sphere is on a wider level, whose number can be negative.
 inline constexpr int kLastLevel = 31;
 
 /// Largest number of cells of one level between the origin and a sphere. In float it has two bits

@@ -12,18 +12,17 @@ namespace cuda {
 /// Number of spheres, the queries, whose neighbors a warp finds together, and of consecutive lanes
 /// that share the tests of a query.
 inline constexpr unsigned kQueries = 8, kLanesOfQuery = 32 / kQueries;
-/// Number of candidates that a warp holds, and of tests that a lane does before it checks whether
-/// candidates are left.
+/// Number of candidates per warp, and of tests per lane before it checks whether candidates remain.
 inline constexpr unsigned kCandidates = 128, kTestsAtOnce = 32 / kLanesOfQuery;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
 /// Largest number of neighbors that a lane keeps.
 inline constexpr unsigned kMaxOfLane = 15;
 inline constexpr unsigned kSorted = 8;  // neighbors that a lane sorts in registers
 /// Largest number of cells in y or z around the spheres of one cell c. A search radius is one cell
-/// wide. Coordinates have at most kMaxCells cells, so that a sum is rounded by at most 1/4 cell,
-/// and a product of cell_of() by as much. The products of the spheres themselves are between c -
-/// 1/4 and c + 1, those of the ends of the range between c - 1.75 and c + 2.5, but for 2^-19: their
-/// cells are c - 2 to c + 2.
+/// wide. Coordinates have at most kMaxCells cells, so a sum is rounded by at most 1/4 cell, and so
+/// is a product of cell_of(). The products of the spheres themselves are between c - 1/4 and c + 1.
+/// Those of the ends of the range are between c - 1.75 and c + 2.5, up to 2^-19: their cells are
+/// c - 2 to c + 2.
 inline constexpr unsigned kMaxRows = 5;
 
 /// Shared memory of a warp.
@@ -39,14 +38,14 @@ struct CrowdedStorage {
   std::uint32_t found[kMaxOfLane * 32];  // lane l has the elements l, l + 32, l + 64, ...
 };
 
-/// Finds the neighbors b > a of each sphere a, and stages them as SingleLevelSearcher does.
+/// Finds the neighbors b > a of each sphere a, and stages them like SingleLevelSearcher.
 class CrowdedSearcher {
  public:
   __device__ CrowdedSearcher(const GridArgs& args, const SearchOutput& output, const GridPlan& plan,
                              CrowdedStorage& storage)
       : args_(args), staging_(staging_output(args, output)), plan_(plan), s_(storage) {}
 
-  /// Finds the neighbors of the spheres at kQueries consecutive positions, or at the last ones.
+  /// Finds the neighbors of the spheres at kQueries consecutive positions, or fewer at the end.
   /// Call from all lanes of a warp.
   __device__ void run(std::uint32_t position) {
     const unsigned queries = min(kQueries, args_.input.n - position);
@@ -60,7 +59,8 @@ class CrowdedSearcher {
     const std::int32_t y = __shfl_sync(kFullWarp, cells.own, 1, kLanesOfQuery),
                        z = __shfl_sync(kFullWarp, cells.own, 2, kLanesOfQuery);
     for (unsigned left = __ballot_sync(kFullWarp, is_query); left != 0;) {
-      // Queries in one row of cells are searched together, because the cells around them overlap.
+      // Queries in the same row of cells are searched together, because the cells around them
+      // overlap.
       const int first = __ffs(static_cast<int>(left)) - 1;
       const std::int32_t first_y = __shfl_sync(kFullWarp, y, first),
                          first_z = __shfl_sync(kFullWarp, z, first);
@@ -82,7 +82,7 @@ class CrowdedSearcher {
     std::int32_t own;
     AxisRange near;
   };
-  /// Those of the query of this lane. The first three lanes of a query compute x, y and z.
+  /// Cells of the query of this lane. The first three lanes of a query compute x, y and z.
   __device__ CellsOfAxis cells_of_axis(const SingleLevel& level) const {
     const LevelBox& box = level.box;
     const bool is_x = part() == 0, is_y = part() == 1;
@@ -99,7 +99,7 @@ class CrowdedSearcher {
     return {cell_of(centre, inverse_width), cells_within(search_radius_of(self_.radius, level.half),
                                                          centre, inverse_width, first, count)};
   }
-  /// The smallest range that contains those of the lanes with `is_in`.
+  /// The smallest range that contains the ranges of the lanes with `is_in`.
   __device__ static CellRange united(const AxisRange& range, bool is_in) {
     using Limits = std::numeric_limits<std::int32_t>;
     const auto lowest = [&](unsigned axis) {
@@ -151,8 +151,8 @@ class CrowdedSearcher {
   }
 
   /// Loads the candidates from `done` on.
-  /// @param rows number of rows that start before them
-  /// @return the number of rows that start before the next ones
+  /// @param rows number of rows that start before these candidates
+  /// @return the number of rows that start before the following candidates
   __device__ std::uint32_t load_candidates(std::uint32_t done, std::uint32_t candidates,
                                            std::uint32_t start, std::uint32_t shift,
                                            std::uint32_t rows, const Vec3& origin) {
@@ -221,7 +221,7 @@ class CrowdedSearcher {
 
   /// Writes the neighbors of each query in order to the staging buffer.
   __device__ void stage(std::uint32_t position, unsigned queries) {
-    std::uint32_t length = found_;  // of this lane and of the lower ones of the query
+    std::uint32_t length = found_;  // of this and the lower lanes of the query
     for (unsigned d = 1; d < kLanesOfQuery; d *= 2) {
       const std::uint32_t below = __shfl_up_sync(kFullWarp, length, d, kLanesOfQuery);
       if (part() >= d) length += below;
@@ -257,7 +257,7 @@ class CrowdedSearcher {
     if (kept != 0 && is_kept) {
       for (unsigned k = 0; k < found_; ++k) row[before + k] = kept_id(k);
     }
-    // A lane of these has found more neighbors than it keeps, so that they are searched again.
+    // A lane has found more neighbors than it can keep: these queries are searched again.
     for (unsigned left = __ballot_sync(kFullWarp, kept != 0 && !is_kept && part() == 0); left != 0;
          left &= left - 1) {
       const int first = __ffs(static_cast<int>(left)) - 1;
@@ -286,8 +286,8 @@ class CrowdedSearcher {
   /// Largest number of neighbors of a row that its lanes sort.
   static constexpr unsigned kMaxSorted = kSorted * kLanesOfQuery;
 
-  /// Sorts the row of each query: each lane sorts kSorted neighbors, and the lanes of a query merge
-  /// theirs (bitonic; K. Batcher, 1968).
+  /// Sorts the row of each query: each lane sorts kSorted neighbors, then the lanes of a query
+  /// merge (bitonic; K. Batcher, 1968).
   __device__ void sort_row(std::uint32_t* row, std::uint32_t length) {
     std::uint32_t ids[kSorted];
 #pragma unroll
@@ -308,8 +308,8 @@ class CrowdedSearcher {
     }
     __syncwarp();
   }
-  /// Exchanges values with the lane whose number differs by the bits of `other`: lanes with the bit
-  /// `upper` keep the larger ones. With kReversed, first values meet last ones.
+  /// Exchanges values with the lane whose number differs by the bits of `other`. Lanes with the bit
+  /// `upper` keep the larger values. With kReversed, first values are compared with last values.
   template <bool kReversed>
   __device__ static void merge(std::uint32_t (&ids)[kSorted], int other, unsigned upper) {
     std::uint32_t theirs[kSorted];
@@ -334,8 +334,7 @@ class CrowdedSearcher {
     }
   }
 
-  /// A warp sorts a row of up to kMaxStaged neighbors by rank, that is, by the number of smaller
-  /// ones.
+  /// A warp sorts a row of up to kMaxStaged neighbors by rank (number of smaller neighbors).
   __device__ static void sort_long_row(std::uint32_t* row, std::uint32_t length) {
     constexpr unsigned kOfLane = (kMaxStaged + 31) / 32;
     std::uint32_t ids[kOfLane], ranks[kOfLane] = {};
@@ -371,7 +370,7 @@ class CrowdedSearcher {
   CrowdedStorage& s_;
   SphereInstance self_;      // of the query of this lane
   std::uint32_t id_ = 0;     // its index
-  std::uint32_t found_ = 0;  // neighbors of it that this lane has found
+  std::uint32_t found_ = 0;  // neighbors found by this lane
 };
 
 }  // namespace cuda

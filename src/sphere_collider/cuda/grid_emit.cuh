@@ -41,7 +41,7 @@ __device__ inline SearchOutput with_row_length(const GridArgs& args, const Searc
   return known;
 }
 
-/// Lists a row that is too long for this phase, for a later phase.
+/// Defers a row that is too long for this phase to a later phase.
 __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uint32_t count,
                                  unsigned long long offset) {
   if (count > kMaxLongRow) {
@@ -51,7 +51,7 @@ __device__ inline void defer_row(const GridArgs& args, std::uint32_t a, std::uin
   }
   args.rows.offsets[a] = offset;
 }
-/// The same for a row whose first neighbors are in slots, which it copies.
+/// defer_row() for a row whose first neighbors are in slots; copies them.
 __device__ inline void defer_row_in_slots(const GridArgs& args, std::uint32_t a,
                                           std::uint32_t count, unsigned long long offset) {
   defer_row(args, a, count, offset);
@@ -77,7 +77,7 @@ __device__ inline void sort_eight(std::uint32_t (&v)[8]) {
   exchange(v[1], v[2]), exchange(v[3], v[4]), exchange(v[5], v[6]);
 }
 
-/// A thread sorts a row: the first eight neighbors by a network, further ones, which are rare, by
+/// A thread sorts a row: the first eight neighbors with a network, the rare further ones by
 /// insertion.
 __device__ inline void sort_neighbors(const std::uint32_t* neighbors, std::uint32_t count,
                                       std::uint32_t* sorted, std::uint8_t* owners) {
@@ -111,8 +111,8 @@ __device__ inline void write_or_stage(const SearchOutput& output, unsigned long 
   reinterpret_cast<SphereContact*>(staged)[lane_id()] = {a, b, r.normal, r.distance};
 }
 
-/// A warp copies the contacts that its lanes have written to `staged` to consecutive indices, so
-/// that it writes whole memory sectors.
+/// A warp copies the contacts of its lanes from `staged` to consecutive indices, so that it writes
+/// whole memory sectors.
 __device__ inline void write_staged(unsigned char* staged, unsigned count, SphereContact* to) {
   static_assert(sizeof(SphereContact) % 8 == 0);
   constexpr unsigned kWords = sizeof(SphereContact) / 8;
@@ -227,8 +227,8 @@ __device__ inline void sort_ids(std::uint32_t* ids, std::uint32_t length) {
   __syncwarp();
 }
 
-/// A warp writes a row of up to kMaxLongRow contacts in order. A short row is not sorted: the rank
-/// of a neighbor is the number of smaller ones.
+/// A warp writes a row of up to kMaxLongRow contacts in order. A short row is written by rank
+/// (number of smaller neighbors) instead of sorting.
 __device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& output,
                                      std::uint32_t a, std::uint32_t* ids) {
   constexpr std::uint32_t kFew = 64;

@@ -8,7 +8,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up at a time
+inline constexpr unsigned kRowsAtOnce = 5;  // rows that a thread looks up together
 inline constexpr unsigned kHeld = 8;        // candidates that a thread holds
 
 /// Keys and levels of the rows of cells that were searched, because a hashed bucket may also hold
@@ -28,9 +28,9 @@ struct SearchStorage {
 };
 
 /// Warps process the spheres in the order of the table. GridArgs::lanes threads share a sphere, and
-/// each searches every `lanes`-th row of cells. The search covers the own level of the sphere (a
-/// pair is found from the sphere whose cell is first in the order of z, y, x or, in one cell, from
-/// the lower position) and all wider levels on which the sphere can have a neighbor.
+/// each searches every `lanes`-th row of cells. The search covers the level of the sphere and all
+/// wider levels on which it can have a neighbor. On its own level, a pair is found from the sphere
+/// whose cell is first in the order of z, y, x or, in one cell, from the lower position.
 template <bool kDense>
 class Searcher {
  public:
@@ -40,7 +40,7 @@ class Searcher {
   __device__ void run() {
     const std::uint32_t spheres_of_warp = 32 / args_.lanes;
     const std::uint32_t chunks = (args_.input.n - 1) / spheres_of_warp + 1;
-    // The warps of a block take adjacent chunks at any time, so that they share cache lines.
+    // The warps of a block process adjacent chunks at any time, so that they share cache lines.
     if (threadIdx.x == 0) storage_.next_work_item = kGridWarps;
     __syncthreads();
     std::uint32_t work_item = threadIdx.x / 32;
@@ -117,7 +117,7 @@ class Searcher {
     }
   }
 
-  /// Continues with the next wider level that can have a neighbor, if there is one.
+  /// Continues with the next wider level that can have a neighbor, if any.
   __device__ bool leave_level(unsigned lane) {
     int next = level_ - 1;
     if (next < widest_far_) {
@@ -199,12 +199,11 @@ class Searcher {
     ++held_;
   }
 
-  /// Accepts the held candidates that are in the row that was searched. Call from all lanes
-  /// together, which share the work: candidate i of the warp belongs to the first lane with sum >
-  /// i. A hashed bucket may contain spheres of other rows. They are rejected here, because they are
-  /// found when their own row is searched, if it is within the search radius. A touching sphere of
-  /// the row is in one of the cells searched, and all of these are different buckets, so that it is
-  /// found exactly once.
+  /// Accepts the held candidates that are in the searched row. Call from all lanes together, which
+  /// share the work: candidate i of the warp belongs to the first lane with sum > i. Spheres of
+  /// other rows in a hashed bucket are rejected; the search of their own row finds them if it is
+  /// within the search radius. A touching sphere of the row is in one of the searched cells, and
+  /// all of these are different buckets, so that it is found exactly once.
   __device__ void accept_held() {
     const unsigned sum = warp_inclusive_sum(held_);
     const unsigned all = __shfl_sync(kFullWarp, sum, 31);
@@ -288,7 +287,7 @@ class Searcher {
   GridCell cell_{};
   std::uint32_t levels_ = 0;  // wider levels that remain to be searched
   int widest_far_ = 0;
-  // The level that is searched, its cells within the search radius, and its next row.
+  // The searched level, its cells within the search radius, and its next row.
   int level_ = 0;
   Real error_bound_ = 0;  // of excess() on this level
   std::int32_t x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0, z1_ = 0, y_ = 0, z_ = 0;

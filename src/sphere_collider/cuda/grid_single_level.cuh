@@ -34,7 +34,7 @@ struct SingleLevel {
 struct AxisRange {
   std::int32_t low, high;
 };
-/// The `count` cells from `first` on, as far as they are within `distance` of x.
+/// Those of the `count` cells from `first` on that are within `distance` of x.
 __device__ inline AxisRange cells_within(Real distance, Real x, Real inverse_width,
                                          std::int32_t first, std::int32_t count) {
   return {max(cell_of(moved(x, -distance), inverse_width), first),
@@ -129,7 +129,7 @@ class SingleLevelSearcher {
       test_candidates(past, warp_max(steps));
     }
     keep_neighbors();
-    // No contact of a long row is staged.
+    // Contacts of a long row are not staged.
     if (not_kept_ != 0) not_kept_ += kept_, kept_ = 0;
     sort_neighbors();
     write_to_staging_buffer(searching);
@@ -137,7 +137,7 @@ class SingleLevelSearcher {
 
  private:
   /// Tests the spheres in the ranges before `past_ranges`, kAtOnce of a range in a step, and holds
-  /// those that may touch.
+  /// spheres that may touch.
   __device__ void test_candidates(const uint2* past_ranges, unsigned steps) {
     const uint2* next = &s_.ranges[lane_id()];
     std::uint32_t* const full = &held(kMaxKept);
@@ -165,8 +165,7 @@ class SingleLevelSearcher {
     }
   }
 
-  /// Keeps those held spheres that touch and have a larger index. If there are more than
-  /// kMaxKept, only counts them.
+  /// Keeps those held spheres that touch and have a larger index; only counts them beyond kMaxKept.
   __device__ void keep_neighbors() {
     const bool uncertain = __any_sync(kFullWarp, !(largest_excess_ < -error_bound_));
     std::uint32_t* to = &held(kept_);
@@ -185,8 +184,8 @@ class SingleLevelSearcher {
   }
   __device__ std::uint32_t& held(unsigned k) { return s_.held[32 * k + lane_id()]; }
 
-  /// Sorts the first kRanked neighbors by rank, that is, by the number of smaller ones. Further
-  /// ones, which are rare, are inserted.
+  /// Sorts the first kRanked neighbors by rank (number of smaller neighbors). Inserts further
+  /// neighbors, which are rare.
   __device__ void sort_neighbors() {
     std::uint32_t positions[kRanked], ids[kRanked];
     unsigned ranks[kRanked] = {};

@@ -12,8 +12,8 @@ namespace cuda {
 inline constexpr unsigned kCountThreads = 1024;
 
 /// Tile of spheres in shared memory. A larger tile writes longer runs and needs fewer atomics. The
-/// large tile needs most of the shared memory of Hopper. The small one needs less than 64 KiB,
-/// which every supported device has.
+/// large tile uses most of the shared memory of Hopper. The small tile uses less than 64 KiB, which
+/// every supported device has.
 template <bool kLarge>
 struct TileStorage {
   static constexpr unsigned kThreads = kLarge ? 1024 : 512;
@@ -183,8 +183,7 @@ __device__ inline void for_each_sphere(const SphereInstance* spheres, std::uint3
 }
 
 /// Replaces the counts of `count` buckets from `first_bucket` on by their starts, in shared memory
-/// and in the table. `before` is the start of the first bucket, and becomes the end of the last
-/// one.
+/// and in the table. `before` is the start of the first bucket and is set to the end of the last.
 template <unsigned kThreads>
 __device__ inline void start_buckets(const GridArgs& args, std::uint64_t first_bucket,
                                      std::uint32_t count, std::uint32_t& before,

@@ -9,7 +9,7 @@ inline namespace JFPX_ABI {
 namespace cuda {
 
 /// Location of a row in the staging buffer: index (58 bits) and length (6 bits). For a long row,
-/// which is not staged, the second field is kNotStaged and the first one is the length.
+/// which is not staged, the second field is kNotStaged and the first field is the length.
 struct StagedList {
   static constexpr unsigned kCountBits = 6, kNotStaged = 63;
   unsigned long long bits;
@@ -120,8 +120,8 @@ __device__ inline unsigned long long contacts_before(const GridArgs& args, std::
   return block_sum(mine, s.sums);
 }
 
-/// A block copies the rows of a bin from the staging buffer to the output, where there are `before`
-/// contacts before them, and lists its long rows for a later phase.
+/// A block copies the rows of a bin from the staging buffer to the output, after the `before`
+/// contacts of earlier bins, and lists its long rows for a later phase.
 /// @return the number of contacts of the bin
 __device__ inline unsigned long long copy_bin(const GridArgs& args, const SearchOutput& output,
                                               std::uint32_t bin, unsigned long long before,
@@ -157,7 +157,7 @@ __device__ inline unsigned long long copy_bin(const GridArgs& args, const Search
   return total >> kStagedBits;
 }
 
-/// All blocks of the kernel copy all bins.
+/// Copies all bins, distributed over all blocks of the kernel.
 __device__ inline void copy_bins(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
   const std::uint32_t bins = bins_of(args.input.n);
   const std::uint32_t first = std::uint64_t{bins} * blockIdx.x / gridDim.x,

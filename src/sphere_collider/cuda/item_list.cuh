@@ -25,7 +25,7 @@ __device__ inline std::size_t first_element() {
 }
 __device__ inline std::size_t element_stride() { return std::size_t{gridDim.x} * kListThreads; }
 
-/// The number of the first n items, sorted by (a, b), that come before (a, b).
+/// The number of items before (a, b) among the first n items, which are sorted by (a, b).
 template <class Item>
 __device__ std::size_t items_before(const Item* items, std::size_t n, std::uint64_t a,
                                     std::uint64_t b = 0) {

@@ -1,7 +1,6 @@
-/// Filtered predicate for spheres that are near each other, relative to a common origin, in float
-/// for both precisions. The squared distance of two points is |p|^2 + |q|^2 - 2 p*q, of which the
-/// squares are computed once per sphere, so that a pair takes three fused multiply-adds and a
-/// subtraction.
+/// Filtered predicate for close spheres, relative to a common origin, in float for both precisions.
+/// The squared distance of two points is |p|^2 + |q|^2 - 2 p*q. The squares are computed once per
+/// sphere, so that a pair takes three fused multiply-adds and a subtraction.
 #pragma once
 
 #include "src/sphere_collider/cuda/sphere_filter.hpp"
@@ -16,14 +15,14 @@ struct LocalQuery {
   float limit;    ///< S^2 - |p|^2 plus a slack, where S is the largest sum of the radii
   float doubt;    ///< bound of the excess of pairs that are not certain
 };
-/// A sphere that may touch it.
+/// A sphere that may touch the query.
 struct alignas(16) LocalCandidate {
   float x, y, z;  ///< its centre q, relative to the origin
   float square;   ///< |q|^2, minus a slack; infinite if there is no sphere
 };
 
 /// Bounds of half a cell width within which no square overflows and underflows are negligible, if
-/// coordinates are within 2^31 cells. CrowdedSearcher also depends on the lower one (kMaxRows).
+/// coordinates are within 2^31 cells. CrowdedSearcher also depends on the lower bound (kMaxRows).
 inline constexpr Real kLeastLocalHalf = Real(0x1p-20), kLargestLocalHalf = Real(0x1p+20);
 
 /// Relative slack, 24 u: see the proof.

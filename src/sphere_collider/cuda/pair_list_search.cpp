@@ -1,4 +1,4 @@
-/// Search for the touching pairs of a list: count, scan and emit, which keeps the order of the
+/// Search for the touching pairs of a list by count, scan and emit, which keeps the order of the
 /// list.
 #include "src/sphere_collider/cuda/pair_list_search.hpp"
 

@@ -1,5 +1,5 @@
 /// Overlap tests of 32 spheres against 32 others: quantized on the tensor cores of a warp, then
-/// exact for the pairs that may touch.
+/// exact for pairs that may touch.
 #pragma once
 
 #include "src/collide/sphere_pair.hpp"

@@ -1,5 +1,5 @@
-/// Conservative overlap test of spheres with quantized coordinates. These are integers, so small
-/// that tensor cores compute with them exactly. No touching pair fails the test.
+/// Conservative overlap test of spheres with quantized coordinates, which are small integers, so
+/// that tensor cores compute exactly. No touching pair fails the test.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_cells.hpp"

@@ -1,4 +1,4 @@
-/// Device functions that the sphere searches share: loading, validation and output.
+/// Device functions shared by the sphere searches: loading, validation and output.
 #pragma once
 
 #include "src/base/cuda/launch.cuh"
@@ -25,7 +25,7 @@ __device__ inline SphereInstance load_sphere(const SphereInstance* p) {
   return s;
 }
 
-/// Loads sphere `i` of the input in the same way.
+/// Loads sphere `i` of the input through the read-only cache.
 __device__ inline SphereInstance load_sphere(const SphereInput& input, std::uint64_t i) {
   if (input.spheres != nullptr) return load_sphere(input.spheres + i);
   const SphereArrays& arrays = input.arrays;
@@ -51,8 +51,8 @@ __device__ inline std::uint32_t first_invalid(const SearchState* state) {
   return first_invalid(state->valid_before);
 }
 
-/// Writes the pair a < b to index `at` of the output. Indices that the search does not read again
-/// are the first to leave the cache.
+/// Writes the pair a < b to index `at` of the output. Values that the search does not read again
+/// are evicted first from the cache.
 __device__ inline void write_pair(const SearchOutput& output, unsigned long long at,
                                   std::uint32_t a, std::uint32_t b) {
   const IndexRows& rows = output.rows;

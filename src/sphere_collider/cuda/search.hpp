@@ -1,4 +1,4 @@
-/// State and output of a sphere search, as the kernels of all searches use them.
+/// State and output of a sphere search, for the kernels of all searches.
 #pragma once
 
 #include <jfpx/contact.hpp>
@@ -26,8 +26,8 @@ inline void check_number_of_spheres(std::size_t n) {
 /// Counters that the kernels of one search share. All bytes are zero at the start of a search.
 struct alignas(16) SearchState {
   unsigned long long contacts;  ///< contacts that the grid found, without long_row_contacts
-  /// Pairs for GridArgs::Rows::overflow, including those for which it has no capacity. The
-  /// single-level search does not use that array, and counts rows that were not staged here.
+  /// Pairs for GridArgs::Rows::overflow, including those beyond its capacity. The single-level
+  /// search does not use that array, and counts rows that were not staged here.
   unsigned long long overflow;
   unsigned long long largest_half;   ///< bits of the largest half cell width that a radius requires
   unsigned long long smallest_half;  ///< ~bits of the smallest one
@@ -59,7 +59,7 @@ struct IndexRows {
   unsigned long long length = 0;  ///< of a row: the number of pairs, which the kernels set
 };
 
-/// Destination of the result of a search: `contacts`, `pairs`, `rows`, or within a search
+/// Destination of the result of a search: one of `contacts`, `pairs`, `rows` or, within a search,
 /// `neighbors`; the others are null.
 struct SearchOutput {
   SphereContact* contacts = nullptr;

@@ -12,14 +12,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Word of host memory that a kernel stores to while the host polls it.
+/// Word of host memory that a kernel writes and the host polls.
 class SearchSignal {
  public:
   SearchSignal() { word_.reserve(1, "signals"); }
   unsigned long long* word() const { return word_.data(); }
   void clear() { *word_.data() = kNoSignal; }
-  /// Waits for the kernel. Polls for a millisecond, as searches are shorter unless `stream` has
-  /// earlier work. @throws DeviceError
+  /// Waits for the kernel. Polls for a millisecond, because searches are shorter unless `stream`
+  /// has earlier work. @throws DeviceError
   unsigned long long wait(cudaStream_t stream) const {
     const std::atomic_ref<unsigned long long> word(*word_.data());
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1);

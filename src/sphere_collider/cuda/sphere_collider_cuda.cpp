@@ -50,7 +50,7 @@ class SphereColliderCuda final : public SphereCollider {
   /// Leaves the contacts in contacts_on_host_ if `mapped`, otherwise on the device.
   /// @return the number of contacts.
   std::size_t search(std::span<const SphereInstance> spheres, bool mapped);
-  /// A buffer is unchanged if there is no memory for a larger one.
+  /// If the allocation of a larger buffer fails, the buffer is unchanged.
   void reserve_geometric(std::size_t spheres, std::size_t contacts, bool mapped);
   void wait() { JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get())); }
 

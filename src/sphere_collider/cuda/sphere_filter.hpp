@@ -1,4 +1,4 @@
-/// Filtered predicates for sphere pairs: cheap tests that never contradict the exact one. Pairs
+/// Filtered predicates for sphere pairs: cheap tests that never contradict the exact test. Pairs
 /// that they cannot decide need the exact formula.
 #pragma once
 
@@ -23,7 +23,7 @@ JFPX_HD inline T fused(T a, T b, T c) {
 /// Result of closeness() for two spheres.
 struct Closeness {
   bool near;     ///< false only if detail::test_sphere_pair() reports that they do not touch
-  bool certain;  ///< true only if it reports that they touch
+  bool certain;  ///< true only if it reports a contact
 };
 
 /// Compares the squared distance of the centres with the squared sum of the radii, with a slack

@@ -14,7 +14,7 @@ namespace cuda {
 
 // Selection of an algorithm, by the number of spheres.
 
-/// Up to this number, one cluster of blocks makes the whole search.
+/// Up to this number, one cluster of blocks performs the whole search.
 inline constexpr std::uint32_t kFusedSpheres = 1024;
 /// Up to this number, the test of all pairs is faster than the grid.
 inline constexpr std::size_t kMaxForAllPairs = 4500;
@@ -52,9 +52,9 @@ inline constexpr unsigned kCoarseBuckets = 2048;
 inline constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
 /// Number of spheres from which the levels of the grid are chosen.
 inline constexpr std::uint32_t kSamples = 4096;
-/// Number of spheres a cell from which on a warp searches for several spheres together.
+/// Number of spheres per cell from which a warp searches for several spheres together.
 inline constexpr Real kCrowded = 3;
-/// Neighbors that a sphere keeps in its own slots; further ones go to a list for all spheres.
+/// Number of neighbor slots per sphere; further neighbors are appended to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
 /// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
 inline constexpr std::uint32_t kMaxStaged = 60;
@@ -69,7 +69,7 @@ inline constexpr std::uint32_t kBinsOfSum = 64;
 // Resident blocks per multiprocessor for which the kernels of the grid are compiled.
 
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-/// Blocks of 512 threads of the sort. Shared memory limits them, of which Turing has less.
+/// Blocks of 512 threads of the sort, limited by shared memory, which is smaller on Turing.
 inline constexpr unsigned kSortBlocks = 2;
 /// Of the searches. A multiprocessor of Turing has 1024 threads, that is, four blocks.
 inline constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 4 : 3;
@@ -80,7 +80,7 @@ inline constexpr unsigned kSortBlocks = sizeof(Real) == 4 ? 3 : 2;
 inline constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
 inline constexpr unsigned kCopyBlocks = 8;
 #endif
-/// Registers for the loads of several candidates gain more than a fifth block.
+/// Registers for the loads of several candidates are worth more than a fifth block.
 inline constexpr unsigned kCrowdedBlocks = std::min(kSearchBlocks, 4u);
 /// Of a search on several levels. Fewer blocks search hashed cells, because each needs more of the
 /// L1 cache.

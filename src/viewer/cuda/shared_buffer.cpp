@@ -4,7 +4,7 @@
 #include "src/base/cuda/cuda_try.hpp"
 
 #include <epoxy/gl.h>
-// After epoxy, which replaces the OpenGL header that it would include.
+// After epoxy, which replaces the OpenGL header that this header would include.
 #include <cuda_gl_interop.h>
 
 namespace jfpx {

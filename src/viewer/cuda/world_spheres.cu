@@ -1,4 +1,4 @@
-/// The balls of a world that lies on a CUDA device: a kernel writes the items that OpenGL draws.
+/// The balls of a world on a CUDA device: a kernel writes the items that OpenGL draws.
 #include <jfpx/cuda/world.hpp>
 
 #include "src/base/cuda/cuda_try.hpp"

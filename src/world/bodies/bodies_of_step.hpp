@@ -1,4 +1,4 @@
-/// Bodies as the contacts of an earlier step show them.
+/// Ids and materials of the bodies of an earlier step, for its contact lists.
 #pragma once
 
 #include "src/world/bodies/body_store.hpp"
@@ -9,7 +9,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// What World::contacts() and World::contact_events() show of a body.
+/// Properties of a body that World::contacts() and World::contact_events() report.
 struct ListedBody {
   BodyId id;
   Real radius = 0, friction = 0, restitution = 0;
@@ -23,10 +23,10 @@ inline ListedBody listed(const BodyStore& store, std::uint32_t body) {
           store.sensor(body)};
 }
 
-/// The bodies that a step had, of which some may have changed or been removed since.
+/// The bodies of an earlier step, some of which may have changed or been removed since.
 class BodiesOfStep {
  public:
-  /// @param changed what the step has of bodies that have changed since; null: none has
+  /// @param changed the former values of changed and removed bodies; null: no body has changed
   explicit BodiesOfStep(const BodyStore& store, const ListedBodies* changed = nullptr)
       : store_(store), changed_(changed) {}
 

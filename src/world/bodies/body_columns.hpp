@@ -1,9 +1,9 @@
 /// The columns of bodies: the values that a body has in a world, on the host and on a device.
 ///
-/// A column is an array, indexed by BodyId::index, a pointer to one, a buffer of a device, or the
-/// value of one body, as the template `Column` of these structs says. A function each_...() calls
-/// visit(column...) for each column of one or several of them; one that forgets a column does not
-/// compile. It also takes other objects whose members have the names of the columns.
+/// The template argument `Column` selects the storage: an array indexed by BodyId::index, a pointer
+/// to one, a buffer of a device, or the value of one body. A function each_...() calls
+/// visit(column...) for each column; a missing column is a compile error. These functions also
+/// accept other structs whose members have the names of the columns.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -56,8 +56,8 @@ struct PropertyColumns {
   Column<Real> velocity_kept{}, angular_velocity_kept{};  ///< damping^substep
 };
 
-/// Inertia in body axes. A world does without these columns while all bodies are immovable or balls
-/// with the inertia of a solid ball.
+/// Inertia in body axes. The columns are empty while all bodies are immovable or balls with the
+/// inertia of a solid ball.
 template <template <class> class Column>
 struct InertiaColumns {
   Column<Mat3> body_inverse_inertia{};
@@ -66,7 +66,7 @@ struct InertiaColumns {
   Column<Mat3> tensor{};
 };
 
-/// The motion that a step changes before it can fail.
+/// Columns of the motion that a step changes before it can fail.
 template <template <class> class Column>
 struct SavedColumns {
   Column<Vec3> last_acceleration{};
@@ -76,10 +76,10 @@ struct SavedColumns {
 
 using MotionArrays = MotionColumns<ArrayColumn>;
 
-/// What no step reads.
+/// Columns that no step reads.
 struct HostArrays {
   std::vector<Shape> shape;
-  std::vector<Real> mass, linear_damping, angular_damping;  ///< those of BodyDef
+  std::vector<Real> mass, linear_damping, angular_damping;  ///< as in BodyDef
   std::vector<std::uint64_t> user_data;
 };
 
@@ -163,9 +163,9 @@ static_assert(visits_all<SavedColumns<PointerColumn>>([](const auto& visit, auto
 
 }  // namespace detail
 
-/// Calls visit(column, member) for each member of a BodyDef and the column that has it, in the
-/// order of snapshots.
-/// @param given_inertia what the visitor takes for BodyDef::inertia
+/// Calls visit(column, member) for each member of a BodyDef and its column, in the order of
+/// snapshots.
+/// @param given_inertia argument of the visitor for BodyDef::inertia
 template <class Motion, class Properties, class Host, class Inertia, class Def, class Visit>
 void each_given(Motion& motion, Properties& properties, Host& host, Inertia& given_inertia,
                 Def& def, const Visit& visit) {

@@ -306,8 +306,8 @@ void BodyStore::wake(std::uint32_t i) {
 }
 
 void BodyStore::wake_by_contact(std::uint32_t sleeper, std::uint32_t awake) {
-  // Copying the motion, instead of raising it to a minimum, lets touching bodies fall asleep
-  // together; with a minimum, they would wake each other alternately without end.
+  // The sleeper gets a copy of the mean motion. With a lower limit instead, two touching bodies
+  // would wake each other alternately and never sleep.
   moving.awake[sleeper] = 1;
   moving.mean_motion[sleeper] = moving.mean_motion[awake];
   moving.rest_time[sleeper] = 0;

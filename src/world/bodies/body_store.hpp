@@ -53,8 +53,8 @@ class BodyStore {
   /// Number of slots; all indices are below it.
   std::size_t capacity() const noexcept { return pool_.capacity(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
-  /// Changes when a body of mass 0 is added or removed, or an immovable body gets another state;
-  /// never 0.
+  /// Never 0. Changes when a body of mass 0 is added or removed, or set_state() moves an immovable
+  /// body.
   std::uint64_t fixed_version() const noexcept { return fixed_version_; }
 
   /// Writes all bodies, the ids, and the ignored pairs.
@@ -66,8 +66,8 @@ class BodyStore {
   bool lives(std::uint32_t body) const noexcept { return pool_.is_used(body); }
 
   JFPX_API BodyState state(std::uint32_t body) const;
-  /// Replaces position, orientation and velocities. Wakes a movable body; makes a kinematic body
-  /// awake if it has a velocity; the velocities of an immovable body remain 0.
+  /// Replaces position, orientation and velocities. Wakes a movable body; wakes a kinematic body if
+  /// it has a velocity; the velocities of an immovable body remain 0.
   void set_state(std::uint32_t body, const BodyState& state);
 
   /// Adds to the force or torque of the next step and wakes the body (erratum E29). Has no effect
@@ -87,15 +87,15 @@ class BodyStore {
   /// [kg m^2], body axes; zero for mass 0
   Mat3 inertia(std::uint32_t body) const;
   bool inertia_given(std::uint32_t body) const { return given_inertia_.contains(body); }
-  /// Makes the arrays of BodyView that have the inertia in body axes. A store does without while
-  /// all bodies are immovable or balls with the inertia of a solid ball. @throws std::bad_alloc
+  /// Allocates the inertia columns of BodyView, which are empty while all bodies are immovable or
+  /// balls with the inertia of a solid ball. @throws std::bad_alloc
   void make_inertia_arrays();
   /// Has no effect on a body of mass 0. @param given absent: the inertia of the solid shape
   /// @throws std::bad_alloc; the store is then unchanged
   void set_inertia(std::uint32_t body, const std::optional<Mat3>& given);
   void set_friction(std::uint32_t body, Real friction) { properties_.friction[body] = friction; }
   void set_restitution(std::uint32_t body, Real value) { properties_.restitution[body] = value; }
-  /// Without the acceleration by forces. [m/s^2]
+  /// [m/s^2], without the acceleration by forces
   const Vec3& acceleration(std::uint32_t body) const { return properties_.acceleration[body]; }
   void set_acceleration(std::uint32_t body, const Vec3& value) {
     properties_.acceleration[body] = value;
@@ -130,7 +130,7 @@ class BodyStore {
   }
   /// Pointers to the arrays. Valid until a body is added or removed, or the ignored pairs change.
   JFPX_API BodyView view() const;
-  /// The same without the sorted list of ids, which takes a pass over all slots after a change.
+  /// view() without the sorted list of ids, which takes a pass over all slots after a change.
   JFPX_API BodyView view_without_ids() const;
   MotionPointers motion_pointers();
 

@@ -1,5 +1,5 @@
-/// The bodies of a world as pointers to arrays, in host memory or on a device, and the functions of
-/// a body that both share.
+/// The bodies of a world as pointers to arrays, in host memory or on a device, and functions of one
+/// body.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -14,13 +14,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Properties and state of bodies that the steps of a world read. The pointers of InertiaColumns
-/// are null while a world does without them.
+/// are null if the world has no inertia columns.
 struct BodyView : MotionColumns<ConstPointerColumn>,
                   PropertyColumns<ConstPointerColumn>,
                   InertiaColumns<ConstPointerColumn> {
   const std::uint64_t* ignored = nullptr;  ///< keys of IgnoredPairs, sorted
   std::uint32_t ignored_count = 0;
-  const std::uint64_t* joined = nullptr;  ///< likewise, of joints
+  const std::uint64_t* joined = nullptr;  ///< keys of pairs excluded by joints, sorted
   std::uint32_t joined_count = 0;
   bool filters_in_use = false;
 
@@ -91,14 +91,14 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   /// @param orientation_now at the start of the substep
   JFPX_HD void accelerate(std::uint32_t i, const Quat& orientation_now, Vec3* v, Vec3* w) const {
     *v = detail::integrated_velocity(*v, last_acceleration[i], substep, velocity_kept[i]);
-    // A product of the inertia with 0 is +0; it is not read then.
+    // The product of the inertia and a zero torque is +0, so the inertia is not read.
     const bool is_driven = !(torque[i] == Vec3{});
     const Vec3 angular = is_driven ? inverse_inertia[i] * torque[i] : Vec3{};
     *w = detail::integrated_velocity(*w, angular, substep, angular_velocity_kept[i]);
     if (!has_gyroscopic_term(i)) return;
-    // Unlike precessed(), this does not rotate the velocity to and fro: rounding makes axes not
-    // quite orthonormal, always to the same side, and with many substeps energy would grow
-    // noticeably.
+    // Unlike precessed(), this does not transform the velocity to body axes and back. Rounding
+    // makes the axes slightly non-orthonormal with a systematic sign, so the energy would grow
+    // noticeably with many substeps.
     const Mat3 axes = to_matrix(orientation_now);
     Vec3 change;
     if (detail::gyroscopic_change(transform_transpose(axes, *w), tensor[i], substep, &change)) {
@@ -119,8 +119,8 @@ struct MotionPointers : MotionColumns<PointerColumn> {
     wake_by_slow_body(bodies, i);
     rest_time[i] = 0;
   }
-  /// Wakes a sleeping body whose island touches slow bodies only. It keeps its rest time: if each
-  /// touch began it anew, two islands could wake each other alternately without end.
+  /// Wakes a sleeping body whose island touches slow bodies only. The rest time is not reset:
+  /// otherwise two islands could wake each other alternately and never sleep.
   JFPX_HD void wake_by_slow_body(const BodyView& bodies, std::uint32_t i) const {
     awake[i] = 1;
     mean_motion[i] = bodies.woken_motion;
@@ -131,7 +131,7 @@ struct MotionPointers : MotionColumns<PointerColumn> {
     velocity[i] = angular_velocity[i] = {};
   }
 
-  /// Ends a step of an awake body at the given state.
+  /// Stores the final state of an awake body.
   JFPX_HD void end_step(const BodyView& bodies, std::uint32_t i, const BodyState& state) const {
     position[i] = state.position;
     orientation[i] = state.orientation;
@@ -140,10 +140,10 @@ struct MotionPointers : MotionColumns<PointerColumn> {
     if (!bodies.is_round(i)) refresh_inertia(bodies, i);
   }
 
-  /// Updates the time for which the body has been slow. A body that a force drives must be slower
-  /// before it may sleep: at the ordinary speed, a damped spring would still be far from its
-  /// equilibrium. The rotation of a sphere counts less, because it moves the surface within itself,
-  /// and no friction ends a rotation about the contact normal.
+  /// Updates the time for which the body has been slow. A body under a force has a lower threshold:
+  /// at the ordinary speed, a damped spring would fall asleep far from its equilibrium. The
+  /// rotation of a sphere has a smaller weight, because it leaves the surface in place, and no
+  /// friction ends a rotation about the contact normal.
   JFPX_HD void update_rest_time(const BodyView& bodies, std::uint32_t i, bool is_driven) const {
     constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.04);
     const Real limit = is_driven ? bodies.sleep_speed * kDriven : bodies.sleep_speed;

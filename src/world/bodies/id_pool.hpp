@@ -11,9 +11,9 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Allocates ids, which are the index of a slot and its generation. The slot of an id that was
-/// removed is reused with a new generation, the last one first. Additions and removals take
-/// constant time; the sorted list of ids is made by the first ids() after them.
+/// Allocates ids of slot index and generation. The most recently freed slot is reused first, with a
+/// new generation. Additions and removals take constant time; the first ids() after a change builds
+/// the sorted list.
 ///
 /// Const functions may run concurrently with each other; all others exclude all calls.
 /// @tparam Id a struct of `index` and `generation`, both std::uint32_t
@@ -74,7 +74,7 @@ class IdPool {
 
   /// Requires contains(id).
   void remove(Id id) noexcept {
-    // Ids are never reused, so the slot is not reused after its last generation.
+    // Ids are unique, so a slot is retired after its last generation.
     if (++generation_[id.index] != 0) free_.push_back(id.index);
     used_[id.index] = 0;
     --size_;
@@ -85,8 +85,8 @@ class IdPool {
   /// Unused slots; the last one is used next.
   const std::vector<std::uint32_t>& unused() const noexcept { return free_; }
 
-  /// Replaces all slots. Those of `unused` must be below generations.size(), each once; use() makes
-  /// the others ids. @throws std::bad_alloc
+  /// Replaces all slots. Indices in `unused` must be distinct and below generations.size(); use()
+  /// allocates the remaining slots. @throws std::bad_alloc
   void assign(const std::vector<std::uint32_t>& generations,
               const std::vector<std::uint32_t>& unused) {
     reserve(generations.size());
@@ -96,7 +96,7 @@ class IdPool {
     size_ = 0;
     ids_.invalidate();
   }
-  /// Puts the id of a slot into use that is neither used nor one of unused().
+  /// Marks a slot as used that is neither used nor in unused().
   void use(std::uint32_t index) noexcept {
     used_[index] = 1;
     ++size_;

@@ -1,4 +1,4 @@
-/// The sub-shapes of a body with their poses in the world, as the queries test them.
+/// The sub-shapes of a body with their world poses, for queries.
 #pragma once
 
 #include "src/collide/shapes.hpp"

@@ -21,7 +21,7 @@ std::uint32_t range_of(const S&, bool is_movable) {
 
 }  // namespace
 
-/// In two passes: the first one counts the sub-shapes of each range, the second one places them.
+/// The first pass counts the sub-shapes of each range; the second pass places them.
 void SubShapeTable::set_bodies(const BodyStore& bodies, std::span<const BodyId> ids) {
   const auto for_each = [&](const auto& visit) {
     for (const BodyId id : ids) {

@@ -19,7 +19,7 @@ class SubShapeTable {
 
   /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies) { set_bodies(bodies, bodies.ids()); }
-  /// Makes the table of some of the bodies. @param ids sorted by index
+  /// Builds the table from a subset of the bodies. @param ids sorted by index
   void set_bodies(const BodyStore& bodies, std::span<const BodyId> ids);
   /// Updates the poses of all sub-shapes from their bodies, except immovable solids and walls.
   /// @param pool null: in the calling thread
@@ -30,7 +30,7 @@ class SubShapeTable {
   const SubShapeRanges& ranges() const { return ranges_; }
   /// Bounding spheres of all spheres and of the other solids of movable bodies.
   std::span<const SphereInstance> bounds() const { return {bounds_.data(), ranges_.fixed_begin()}; }
-  /// Solids of kinematic bodies that are no spheres, ascending.
+  /// Solids of kinematic bodies other than spheres, ascending.
   std::span<const SubShape> kinematic() const { return kinematic_; }
   /// Number of parts of compounds.
   std::size_t part_count() const { return local_.size(); }
@@ -40,7 +40,7 @@ class SubShapeTable {
   std::vector<std::uint32_t> body_;     ///< by sub-shape
   std::vector<std::uint32_t> number_;   ///< by sub-shape: its index in the compound
   std::vector<SphereInstance> bounds_;  ///< of solids
-  std::vector<PosedSolid> solids_;      ///< of solids that are no spheres
+  std::vector<PosedSolid> solids_;      ///< of solids other than spheres
   std::vector<Wall> walls_;
   std::vector<std::uint32_t> part_;  ///< by solid: 0, or 1 + index in local_
   std::vector<Transform> local_;     ///< poses of parts, in body axes

@@ -12,7 +12,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A solid that is no sphere.
+/// A solid other than a sphere.
 struct PosedSolid {
   detail::Solid solid;
   Transform pose;
@@ -34,8 +34,8 @@ struct Wall {
 inline Wall to_wall(const HalfSpace& half_space) { return {half_space, false}; }
 inline Wall to_wall(const Plane& plane) { return {{plane.normal, plane.offset}, true}; }
 
-/// Numbers of the first sub-shapes of each range. The ranges are: all spheres; the other solids of
-/// movable bodies, by kind; those of bodies of mass 0 (also kinematic ones), by kind; walls.
+/// Index of the first sub-shape of each range. The ranges are: all spheres; other solids of movable
+/// bodies, by kind; other solids of bodies of mass 0 (immovable or kinematic), by kind; walls.
 struct SubShapeRanges {
   static constexpr std::uint32_t kSolidKinds = detail::SolidKinds::kCount;
   static constexpr std::uint32_t kWalls = 2 * kSolidKinds - 1, kCount = kWalls + 1;
@@ -56,7 +56,7 @@ struct SubShapeRanges {
   }
 
   JFPX_HD std::uint32_t spheres() const { return begin[1]; }
-  /// The first solid of a body of mass 0 that is no sphere.
+  /// The first solid of a body of mass 0 other than a sphere.
   JFPX_HD std::uint32_t fixed_begin() const { return begin[kSolidKinds]; }
   /// Number of all sub-shapes but walls.
   JFPX_HD std::uint32_t bounded() const { return begin[kWalls]; }
@@ -71,7 +71,7 @@ struct SubShapeView {
   const std::uint32_t* bodies = nullptr;   ///< by sub-shape
   const std::uint32_t* numbers = nullptr;  ///< by sub-shape: its index in the compound
   SphereInstance* all_bounds = nullptr;    ///< of solids
-  PosedSolid* solids = nullptr;            ///< of solids that are no spheres
+  PosedSolid* solids = nullptr;            ///< of solids other than spheres
   const Wall* walls = nullptr;
   const std::uint32_t* parts = nullptr;  ///< by solid: 0, or 1 + index in `local`
   const Transform* local = nullptr;      ///< poses of parts, in body axes
@@ -88,7 +88,7 @@ struct SubShapeView {
   /// The sphere itself, or the bounding sphere of another solid.
   JFPX_HD const SphereInstance& bounds(SubShape i) const { return all_bounds[i]; }
 
-  /// Calls visit(solid, pose) with the shape of a solid that is no sphere.
+  /// Calls visit(solid, pose) with the shape of a solid other than a sphere.
   template <class Visit>
   JFPX_HD void visit_solid(SubShape i, const Visit& visit) const {
     const PosedSolid& posed = solid(i);
@@ -99,7 +99,7 @@ struct SubShapeView {
       }
     });
   }
-  /// Calls visit(instance) with a solid as find_contact() takes it.
+  /// Calls visit(instance) with a solid in the form that find_contact() accepts.
   template <class Visit>
   JFPX_HD void visit_instance(SubShape i, const Visit& visit) const {
     if (is_sphere(i)) {
@@ -138,7 +138,7 @@ JFPX_HD inline void find_contact(const SubShapeView& sub_shapes, SubShapeView::S
     const HalfSpace wall = sub_shapes.wall(q).solid_for(centre);
     sub_shapes.visit_instance(p, [&](const auto& a) { find_contact(a, wall, pair, manifold); });
   } else if (sub_shapes.is_sphere(p) && sub_shapes.is_sphere(q)) {
-    // The arithmetic of the collider depends on the order of the spheres, which is its own.
+    // The arithmetic of the collider depends on the order of the spheres: use the collider's order.
     const SphereInstance &a = sub_shapes.bounds(p), &b = sub_shapes.bounds(q);
     if (p < q) return find_contact(a, b, pair, manifold);
     find_contact(b, a, pair.flipped(), manifold);

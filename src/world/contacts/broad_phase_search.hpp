@@ -12,8 +12,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Interface of the searches that BroadPhase selects. The collider tests every pair in all of them,
-/// so the contacts, their bits and their order are the same.
+/// Interface of the searches that BroadPhase selects. Every search tests pairs with the collider,
+/// so all searches return the same contacts with the same bits in the same order.
 class BroadPhaseSearch {
  public:
   /// @param collider not null
@@ -26,9 +26,9 @@ class BroadPhaseSearch {
   /// All touching pairs, sorted. Valid until the next call.
   /// @throws the exceptions of SphereCollider::find_contacts() and find_touching()
   virtual ContactSpan find(std::span<const SphereInstance> spheres) = 0;
-  /// The pairs of find() as indices alone, perhaps among others. Takes less time if the spheres
-  /// have moved little since the last call. Valid until the next call of either function.
-  /// @throws as find()
+  /// The pairs of find() without contact data; may include pairs that do not touch. Faster if the
+  /// spheres have moved little since the last call. Valid until the next call of either function.
+  /// @throws the exceptions of find()
   virtual NeighborPairs find_pairs(std::span<const SphereInstance> spheres, ThreadPool* pool) = 0;
 
   SphereCollider& collider() const noexcept { return *collider_; }

@@ -9,8 +9,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Contact of two sub-shapes: of those that may touch during the step, with the points that the
-/// solver needs, and of those that touch at its start, with the points of World::contacts().
+/// Result of a candidate test: contact points for the solver if the sub-shapes may touch during the
+/// step, and points of World::contacts() if they touch at its start.
 struct CandidateManifold : detail::PairManifold {
   soft_step::ContactKey key;
 };

@@ -14,8 +14,8 @@ std::uint64_t pair_of(std::uint32_t low, std::uint32_t high) {
 
 }  // namespace
 
-/// Most contacts are between spheres and already sorted, so only the part after the first sorted
-/// run is sorted and then merged with it.
+/// Sorts only the part after the first sorted run, and merges both. Most contacts are between
+/// spheres and already sorted.
 void ContactEvents::PairList::start(std::span<const Contact> contacts) {
   contacts_ = contacts;
   next_ = 0;
@@ -64,7 +64,7 @@ void ContactEvents::Comparison::compute(std::span<const Contact> contacts_before
     } else {
       const ContactEvent old = before.take(), now = after.take();
       const bool stays = now.a == old.a && now.b == old.b;
-      // A new body may have the index of an old one.
+      // A new body may reuse the index of a removed one.
       if (!stays) add(old, ContactPhase::end);
       add(now, stays ? ContactPhase::stay : ContactPhase::begin);
     }

@@ -15,13 +15,13 @@ namespace {
 using soft_step::ContactSet;
 
 constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NeighborPairs::kMostSelected;
-/// A test of a box takes as long as dozens of tests of spheres.
+/// The test of a box takes as long as dozens of sphere tests.
 constexpr std::size_t kCandidatesPerChunk = 128;
 /// Chunks of a batch for each thread: enough to balance their loads.
 constexpr std::size_t kChunksPerThread = 4;
 
-/// A list that is filled again in every step. Its vector keeps the items of the last step until
-/// they are overwritten, because constructing them again would take as long as filling them.
+/// A list that is refilled in every step. Its vector keeps the items of the last step until they
+/// are overwritten, because constructing items takes as long as filling them.
 template <class Item>
 struct Refilled {
   std::vector<Item>* items;
@@ -61,7 +61,7 @@ void ContactFinder::set_bodies(const BodyStore& bodies) {
   fixed_changed_ = true;
 }
 
-/// Points swept_bounds_ to the arrays of a search.
+/// Sets the pointers of swept_bounds_ to the arrays of a search.
 void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
   motion_.resize(bodies.capacity());
   swept_.resize(sub_shapes_.ranges().bounded());
@@ -74,8 +74,8 @@ void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
                    .largest_margin = margin * Real(0.5)};
 }
 
-/// Makes the swept bounds of the solids of mass 0 that are no spheres, and their trees.
-/// @param sweep function that makes the bounds of a sub-shape
+/// Computes the swept bounds of solids of mass 0 other than spheres, and their trees.
+/// @param sweep function that computes the bounds of a sub-shape
 template <class Sweep>
 void ContactFinder::sweep_fixed(const Sweep& sweep) {
   if (!fixed_changed_) {
@@ -113,9 +113,9 @@ const SweptBounds& ContactFinder::enclose_bounds(const BodyStore& bodies) {
   return swept_bounds_;
 }
 
-/// Tests pairs of swept bounds: contacts of two spheres go to *part, pairs with a box or a part of
-/// a compound to its candidates. Spheres of compounds become manifolds, because their arms are not
-/// multiples of the normal.
+/// Tests pairs of swept bounds. Contacts of two spheres are appended to *part, pairs with a box or
+/// a part of a compound to its candidates. Spheres of compounds become manifolds, because their
+/// lever arms are not multiples of the normal.
 void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const SpherePair> pairs,
                                       Part* part) const {
   const BodyView& view = swept_bounds_.bodies;
@@ -175,9 +175,9 @@ void ContactFinder::Part::add(const BodyStore& bodies, const CandidateManifold& 
   manifolds.push_back({found.key, found.normal, first, found.point_count});
 }
 
-/// Calls find(first, last, part) for the chunks of [0, count), from any thread, and then
-/// append_all(parts) in this thread; batch by batch, so that the parts take little memory, and are
-/// still in the cache when they are appended.
+/// Calls find(first, last, part) for the chunks of [0, count) from any thread, then
+/// append_all(parts) in this thread. Works in batches, so that the parts are small and still in the
+/// cache when they are appended.
 template <class Find, class AppendAll>
 void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk,
                                    const Find& find, const AppendAll& append_all) {

@@ -15,11 +15,11 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// The broad phase tests all spheres and the bounding spheres of the other solids of movable
-/// bodies: it finds the contacts of two spheres and the candidate pairs with another solid. The
-/// other solids of bodies of mass 0 (immovable or kinematic) are in trees, which each solid of a
-/// movable body traverses; walls are tested against all of these. Contacts within one body, between
-/// two bodies of mass 0, and of pairs that BodyStore::may_collide() excludes, are discarded.
+/// The broad phase tests all spheres and the bounding spheres of other solids of movable bodies. It
+/// returns contacts of two spheres and candidate pairs with another solid. Other solids of bodies
+/// of mass 0 (immovable or kinematic) are in trees, which each solid of a movable body traverses.
+/// Walls are tested against every solid of a movable body. Contacts within one body, between two
+/// bodies of mass 0, and of pairs that BodyStore::may_collide() excludes are discarded.
 class ContactFinder {
  public:
   /// @param broad_phase not null
@@ -29,11 +29,11 @@ class ContactFinder {
   /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
 
-  /// Finds the contacts of the current poses, and all pairs that may touch during the step: those
-  /// that are closer than a margin, and those that meet at their velocities. Contacts of two
-  /// spheres precede all others; both are sorted by (a.index, b.index), then by the sub-shapes of a
-  /// and of b. Contact defines which body is a. Friction and restitution are left 0. Forces of the
-  /// step must have been added up.
+  /// Finds the contacts at the current poses and the speculative contacts: pairs that are closer
+  /// than a margin, or whose velocities let them touch during the step. Contacts of two spheres
+  /// precede all others; both are sorted by (a.index, b.index), then by the sub-shapes of a and of
+  /// b. Contact defines which body is a. Friction and restitution are 0. The forces of the step
+  /// must have been summed before.
   /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
   /// @param set      receives all pairs, each list sorted by key
   /// @param detected receives the contacts with distance <= 0 that are not in set->spheres
@@ -49,9 +49,10 @@ class ContactFinder {
   // Parts of a search among the current poses, without margin and motion.
 
   using SubShape = SubShapeTable::SubShape;
-  /// Makes bounds of the sub-shapes where they are, for find_fixed_pairs(). Poses must be updated.
+  /// Computes bounds of the sub-shapes at their current poses, for find_fixed_pairs(). The poses
+  /// must be up to date.
   JFPX_API const SweptBounds& enclose_bounds(const BodyStore& bodies);
-  /// Appends the pairs of a movable sub-shape and a wall, or a solid of mass 0 that is no sphere,
+  /// Appends the pairs of a movable sub-shape and a wall or solid of mass 0 other than a sphere
   /// whose bounds touch; sorted for each sub-shape.
   /// @param first,last range of movable sub-shapes
   JFPX_API void find_fixed_pairs(SubShape first, SubShape last,
@@ -94,7 +95,7 @@ class ContactFinder {
   SubShapeTable sub_shapes_;
   std::vector<Candidate> candidates_;
   FixedTrees fixed_trees_;
-  bool fixed_changed_ = true;          ///< whether `swept_` and the trees lack solids of mass 0
+  bool fixed_changed_ = true;          ///< whether solids of mass 0 need new bounds
   std::vector<Vec3> motion_;           ///< by body [m]
   std::vector<SphereInstance> swept_;  ///< by solid: bounds of the step's motion
   std::vector<Real> margins_;          ///< by solid [m]

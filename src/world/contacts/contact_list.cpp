@@ -53,8 +53,8 @@ BegunCounts count_begun_contacts(const ContactView& contacts, ThreadPool* pool) 
 }
 
 /// Appends the contacts of ContactSet::spheres that touched at the start of the step and, with
-/// `with_begun`, those that began during the step. Each is one contact at most, so that the list is
-/// sorted as the set is.
+/// `with_begun`, those that began during the step. The list has the order of the set, because each
+/// item of the set yields at most one contact.
 void ContactListMaker::append_spheres(const DetectedContacts& detected, const ContactView& contacts,
                                       bool with_begun, const BodiesOfStep& bodies,
                                       std::vector<Contact>* list) {

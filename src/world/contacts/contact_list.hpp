@@ -1,4 +1,4 @@
-/// The list of World::contacts(), made on demand from the contacts of a step.
+/// The list of World::contacts(), built on demand from the contacts of a step.
 #pragma once
 
 #include <jfpx/scene.hpp>
@@ -22,15 +22,15 @@ struct ContactList {
   std::size_t detected = 0;  ///< number of contacts before those of contact generators
 };
 
-/// Makes lists from the contacts of a step. Owns its buffers, which grow and never shrink.
+/// Builds lists from the contacts of a step. Owns its buffers, which grow and never shrink.
 class ContactListMaker {
  public:
   /// @param pool outlives the object
   explicit ContactListMaker(ThreadPool* pool) : pool_(pool) {}
 
   /// @param detected,contacts of the same step
-  /// @param with_begun whether the step has ended, so that `contacts` has its impulses; adds the
-  ///                 contacts that began during the step
+  /// @param with_begun adds the contacts that began during the step; requires the impulses of the
+  ///                 completed step in `contacts`
   /// @param bodies   with the ids and materials of the step
   /// @throws std::bad_alloc
   void make(const DetectedContacts& detected, const soft_step::ContactView& contacts,

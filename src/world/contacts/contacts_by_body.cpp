@@ -14,7 +14,7 @@ bool ContactsByBody::build(std::span<const Contact> contacts) noexcept {
   std::uint32_t highest = 0;
   for (const Contact& c : contacts) highest = std::max({highest, c.a.index, c.b.index});
   try {
-    // One more than there are limits: the limits move by one while the contacts are placed.
+    // One additional entry: placing the contacts shifts the limits by one.
     assign_geometric(&begin_, std::size_t{highest} + 3, 0);
     resize_geometric(&of_body_, 2 * contacts.size());
   } catch (const std::bad_alloc&) {

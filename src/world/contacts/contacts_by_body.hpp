@@ -11,8 +11,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Index of a list of contacts by body. The first search in a list tests every contact; the second
-/// one makes the index, so that many searches take linear time in all. Owns its buffers, which grow
+/// Index of a list of contacts by body. The first search tests every contact; the second search
+/// builds the index, so that many searches take linear time in total. Owns its buffers, which grow
 /// and never shrink.
 class ContactsByBody {
  public:

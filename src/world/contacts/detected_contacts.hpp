@@ -9,11 +9,11 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Complements a soft_step::ContactSet: ContactListMaker makes the contacts of ContactSet::spheres
-/// from the set itself, and takes all others from here.
+/// Complement of a soft_step::ContactSet: ContactListMaker computes the contacts of
+/// ContactSet::spheres from the set and copies all other contacts from this struct.
 struct DetectedContacts {
-  /// Contacts of sensors, compounds, boxes and walls at the start of the step, without materials:
-  /// first those of two spheres, then all others, both as in World::contacts().
+  /// Contacts of sensors, compounds, boxes and walls at the start of the step, without materials.
+  /// Contacts of two spheres precede all others; both parts have the order of World::contacts().
   std::vector<Contact> contacts;
   std::size_t sphere_count = 0;    ///< number of contacts of two spheres in `contacts`
   std::vector<Contact> generated;  ///< contacts of contact generators

@@ -1,4 +1,4 @@
-/// Building and moving of the trees of the solids of mass 0.
+/// Construction and refitting of the trees of the solids of mass 0.
 #include "src/world/contacts/fixed_trees.hpp"
 
 #include <utility>
@@ -18,14 +18,14 @@ void FixedTrees::set_bodies(const SubShapeTable& table, const SweptBounds& bound
   }
   if (next_keys_ == keys_ && margin_ == bounds.largest_margin) return move_kinematic(bounds);
   std::swap(keys_, next_keys_);
-  margin_ = -1;  // the next call builds again if this one throws
+  margin_ = -1;  // forces a rebuild by the next call if this one throws
   build(bounds, false, &immovable_);
   build(bounds, true, &kinematic_);
   margin_ = bounds.largest_margin;
 }
 
 void FixedTrees::move_kinematic(const SweptBounds& bounds) {
-  // Bodies that have moved apart make large blocks.
+  // Blocks grow as their bodies move apart.
   constexpr std::uint32_t kStepsPerBuild = 32;
   if (kinematic_.view().block_count == 0) return;
   if (++steps_ % kStepsPerBuild == 0) return build(bounds, true, &kinematic_);

@@ -1,4 +1,4 @@
-/// Trees of the solids of mass 0 that are no spheres, for the contact search.
+/// Trees of the solids of mass 0 other than spheres, for the contact search.
 #pragma once
 
 #include "src/collide/block_tree.hpp"
@@ -11,8 +11,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Two trees: that of the immovable solids is built when one of them has come, gone or moved; that
-/// of the kinematic solids, which move in every step, gets new bounds in every step.
+/// Two trees. The tree of immovable solids is rebuilt when one of them is added, removed or moved;
+/// the tree of kinematic solids, which move in every step, is refitted in every step.
 class FixedTrees {
  public:
   /// Must be called after SubShapeTable::set_bodies().
@@ -23,7 +23,7 @@ class FixedTrees {
   FixedTreesView view() const { return {immovable_.view(), kinematic_.view()}; }
 
  private:
-  /// A solid of mass 0 as the tree has it: the pose of a kinematic one has no effect.
+  /// Identity of a solid of mass 0 in the tree; the pose of a kinematic solid is ignored.
   struct Key {
     PosedSolid solid;
     bool is_kinematic = false;

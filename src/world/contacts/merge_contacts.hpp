@@ -14,8 +14,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Merges the ranges [0, middle) and [middle, size) of a list, both sorted by (a.index, b.index).
-/// Of equal contacts, those of the first range come first. Unlike std::inplace_merge(), allocates
-/// nothing but the buffer, which the caller keeps.
+/// The merge is stable. Unlike std::inplace_merge(), it allocates only the buffer, which the caller
+/// keeps.
 inline void merge_by_bodies(std::size_t middle, std::span<Contact> contacts,
                             std::vector<Contact>* buffer) {
   const auto pair_of = [](const Contact& c) { return std::pair(c.a.index, c.b.index); };

@@ -12,22 +12,22 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Fewer spheres are tested pair by pair in about the same time.
+/// Below this number of spheres, testing all pairs takes about the same time.
 constexpr std::size_t kFewest = 512;
 constexpr std::size_t kSpheresPerChunk = 4096;
-/// The slack is the motion of about this number of searches, within these parts of the smallest
+/// The slack is the motion of about kSearches searches, limited to fractions of the smallest
 /// radius. More slack means more pairs to test in every search (bench/results/soft_step.md).
 constexpr Real kSearches = 10, kLeast = Real(0.02), kMost = Real(0.15);
-/// Bounds that would last for fewer searches take more time than they save.
+/// Bounds that last for fewer searches cost more time than they save.
 constexpr Real kFewestSearches = Real(2.5);
 
-/// NaN is the largest number.
+/// Maximum, with NaN as the largest number.
 Real larger(Real x, Real y) { return x > y || x != x ? x : y; }
 
 }  // namespace
 
-/// The largest distance by which a sphere has moved or grown since the bounds were made; above
-/// slack_ if a sphere is not within its bound.
+/// The largest distance by which a sphere has moved or grown since the bounds were computed; above
+/// slack_ if a sphere has left its bound.
 Real NeighborList::largest_motion(std::span<const SphereInstance> spheres, ThreadPool* pool) {
   constexpr Real kMargin = 1 + 16 * kEpsilon;
   const auto largest_of = [&](std::size_t first, std::size_t last) {

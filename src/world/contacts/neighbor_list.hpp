@@ -1,4 +1,4 @@
-/// Pairs of spheres that are near each other, kept from search to search (Verlet 1967).
+/// Neighbor list: pairs of close spheres, reused by several searches (Verlet 1967).
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
@@ -14,7 +14,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Sorted pairs of spheres, among which are all that touch.
+/// Sorted candidate pairs of spheres, which include all touching pairs.
 struct NeighborPairs {
   std::span<const SpherePair> pairs;
   bool all_touch = true;
@@ -38,15 +38,15 @@ struct NeighborPairs {
 
 /// Finds the touching pairs of spheres that move little between two searches. Each sphere has a
 /// larger bound. While all spheres are within their bounds, only pairs of touching bounds are
-/// tested. The touching pairs and their order are those of a search among the spheres, whatever
-/// happened before. Owns its buffers, which only grow.
+/// tested. The result does not depend on earlier searches: the pairs and their order are those of a
+/// search among the spheres. Owns its buffers, which grow and never shrink.
 ///
 /// Claim: if two spheres that are within their bounds touch, the bounds touch. A sphere counts as
 /// within its bound if (distance of the centres + radius) * (1 + 16 eps) <= radius of the bound.
 /// The exact test rounds the distance and the sum of the radii with a relative error of at most 4
 /// eps, so the centres of the bounds are at most (R_a + R_b)(1 - 7 eps) apart, and the test of the
-/// bounds finds that they touch. Radii are at least kLeastRadius, so that no error of underflow
-/// counts.
+/// bounds reports a contact. Radii are at least kLeastRadius, so errors of underflow are
+/// negligible.
 class NeighborList {
  public:
   /// Valid until the next call, or another call of the collider.

@@ -1,4 +1,4 @@
-/// The contacts that a World shows, and those of the step before.
+/// The contacts of the last two steps of a World.
 #pragma once
 
 #include "src/base/lazy.hpp"
@@ -12,12 +12,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Contacts of the last two steps that were not undone.
+/// Contacts of the last two steps, without undone steps.
 struct StepContacts {
   enum class State {
-    kept,      ///< `last` is of the step before the one in progress
+    kept,      ///< `last` precedes the step in progress, whose contacts are not detected yet
     found,     ///< `last` is of the step in progress, or complete
-    repeated,  ///< the last step was left out in a world at rest: `before` equals `last`
+    repeated,  ///< the last step was skipped, because the world was at rest: `before` equals `last`
   };
 
   explicit StepContacts(ThreadPool* pool) : maker(pool) {}
@@ -27,7 +27,7 @@ struct StepContacts {
     events.invalidate();
     by_body.invalidate();
   }
-  /// The contacts of the last step become those of the step before.
+  /// Stores the contacts of the last step as those of the step before.
   void begin_detection() noexcept {
     swap_steps();
     last.invalidate();

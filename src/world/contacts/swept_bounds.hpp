@@ -9,8 +9,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Trees of the solids of mass 0 that are no spheres. An item is the number of a sub-shape minus
-/// SubShapeRanges::fixed_begin(), which does not change while movable bodies come and go.
+/// Trees of the solids of mass 0 other than spheres. An item is the number of a sub-shape minus
+/// SubShapeRanges::fixed_begin(), which does not depend on movable bodies.
 struct FixedTreesView {
   BlockTreeView immovable, kinematic;
 };
@@ -35,8 +35,8 @@ struct SweptBounds {
 
   /// Fills swept[i] with a sphere that encloses the motion of the sub-shape, and margins[i].
   JFPX_HD void sweep(SubShape i) const {
-    // The margin is at most this part of the size, so that small bodies do not collect contacts
-    // with everything around them.
+    // The margin is at most this fraction of the size, so that small bodies do not get contacts
+    // with all their neighbors.
     constexpr Real kMarginPerSize = Real(0.04);
     const SphereInstance& bounds = sub_shapes.bounds(i);
     Real size = bounds.radius;
@@ -57,7 +57,7 @@ struct SweptBounds {
     }
     swept[i] = rounded(sphere);
   }
-  /// The same without margin and motion: a sphere that encloses the sub-shape where it is.
+  /// sweep() without margin and motion: a sphere that encloses the sub-shape at its current pose.
   JFPX_HD void enclose(SubShape i) const {
     margins[i] = 0;
     swept[i] = rounded(sub_shapes.bounds(i));
@@ -91,13 +91,13 @@ struct SweptBounds {
     if (!(length_squared(swept[i].centre - swept[fixed].centre) <=
           most * most * (1 + 64 * kEpsilon)))
       return false;
-    // The bounding sphere of a wide floor contains everything above it. During the step, no point
-    // of the solid is farther than 2 * moved from the solid at the start.
+    // The bounding sphere of a wide floor contains everything above it. During the step, each
+    // point of the solid stays within 2 * moved of the solid at the start.
     const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
     const PosedSolid& posed = sub_shapes.solid(fixed);
     const Vec3& centre = swept[i].centre;
     const Real far = sum(posed.pose.origin) + swept[fixed].radius + sum(centre);
-    // A centre that is not farther than kEpsilon counts as inside.
+    // A centre at a distance of at most kEpsilon counts as inside.
     const Real radius =
         swept[i].radius + posed.solid.radius + 2 * moved + 16 * kEpsilon * far + kEpsilon;
     const Vec3 local = transform_transpose(posed.pose.basis, centre - posed.pose.origin);
@@ -105,7 +105,7 @@ struct SweptBounds {
     return length_squared(outside) <= radius * radius;
   }
 
-  /// [m]: the sub-shapes of a candidate have a contact if they come closer.
+  /// [m], the distance below which the sub-shapes of a candidate have a contact
   JFPX_HD Real margin_of(const Candidate& pair) const {
     const SubShape p = pair.sub_shape_a, q = pair.sub_shape_b;
     if (sub_shapes.is_wall(q)) return 2 * margins[p] + spin(p);
@@ -113,7 +113,8 @@ struct SweptBounds {
   }
 
   /// Bounds of a solid of mass 0 in the tree. If they do not overlap query_bounds() of a movable
-  /// sub-shape, may_meet() is false: both are larger by their part of its radius, twice the error.
+  /// sub-shape, may_meet() is false: each bound includes its part of the radius in may_meet(), with
+  /// twice the error.
   JFPX_HD Aabb tree_bounds(SubShape fixed) const {
     const PosedSolid& posed = sub_shapes.solid(fixed);
     const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
@@ -134,8 +135,8 @@ struct SweptBounds {
     const Vec3 half{reach, reach, reach};
     return {sphere.centre - half, sphere.centre + half};
   }
-  /// Calls visit(fixed) for the walls, and the other solids of mass 0 that are no spheres, that a
-  /// movable sub-shape may meet, in any order.
+  /// Calls visit(fixed) in any order for the walls and the other solids of mass 0, except spheres,
+  /// that a movable sub-shape may touch.
   template <class Visit>
   JFPX_HD void visit_fixed(SubShape i, const FixedTreesView& trees, const Visit& visit) const {
     const std::uint32_t body = sub_shapes.body(i);
@@ -153,14 +154,14 @@ struct SweptBounds {
   }
 
  private:
-  /// Larger by more than the rounding errors of the centre and of the radius.
+  /// Enlarges by more than the rounding errors of the centre and of the radius.
   JFPX_HD static SphereInstance rounded(SphereInstance sphere) {
     const Vec3& c = sphere.centre;
     const Real largest = larger(larger(absolute(c.x), absolute(c.y)), absolute(c.z));
     sphere.radius += 8 * kEpsilon * (largest + sphere.radius);
     return sphere;
   }
-  /// [m], bound of the motion of a solid's surface by the rotation of its body; 0 for a sphere.
+  /// [m], upper bound of the motion of a solid's surface by rotation; 0 for a sphere.
   JFPX_HD Real spin(SubShape i) const {
     const std::uint32_t body = sub_shapes.body(i);
     if (sub_shapes.is_sphere(i) || bodies.awake[body] == 0) return 0;

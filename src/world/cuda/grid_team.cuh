@@ -1,4 +1,4 @@
-/// The threads of a cooperative launch, which run the program of a device step together.
+/// The threads of a cooperative launch that run the program of a device step.
 #pragma once
 
 #include "src/base/cuda/warp.cuh"
@@ -11,8 +11,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Loops over items. All threads must call the same functions with the same numbers of items. Items
-/// of scan() and partition() belong to consecutive chunks, one for each block.
+/// Loops over items. All threads must call the same functions with the same item counts. scan() and
+/// partition() assign consecutive chunks of items to the blocks.
 class GridTeam {
  public:
   static constexpr unsigned kThreads = device::tuning::kThreads;
@@ -42,7 +42,7 @@ class GridTeam {
     }
 #if __CUDA_ARCH__ >= 900
     if (is_cluster_) {
-      __threadfence();  // the blocks have different first-level caches
+      __threadfence();  // first-level caches of the blocks are not coherent
       cooperative_groups::this_cluster().sync();
       return;
     }
@@ -50,7 +50,7 @@ class GridTeam {
     cooperative_groups::this_grid().sync();
 #endif
   }
-  /// A copy of an array of device::kBins + 1 numbers in shared memory. At most one exists at a
+  /// Copies an array of device::kBins + 1 numbers to shared memory. At most one copy exists at a
   /// time.
   JFPX_HD const std::uint32_t* cached_bins(const std::uint32_t* numbers) const {
 #if defined(__CUDA_ARCH__)
@@ -83,8 +83,8 @@ class GridTeam {
     if (first() == 0) f();
 #endif
   }
-  /// Calls f(team) with a team of the threads of one block, whose barriers are faster. Has no
-  /// barrier itself.
+  /// Calls f(team) with the threads of one block as a team, whose barriers are faster. No barrier
+  /// follows.
   template <class F>
   JFPX_HD void in_one_block(const F& f) const {
 #if defined(__CUDA_ARCH__)
@@ -96,9 +96,9 @@ class GridTeam {
   }
 
   /// Dataflow without a barrier: for all i < n, starts an item with begin(i, &item), waits until
-  /// is_ready(item), and calls complete(item). An item may wait for items of lower warps, of 32
-  /// items each, and for those of earlier calls. All calls with the same n give item i to the same
-  /// thread, and once() always uses the same thread.
+  /// is_ready(item), and calls complete(item). An item may wait for items of lower warps (32 items
+  /// each) and of earlier calls. All calls with the same n assign item i to the same thread; once()
+  /// always uses the same thread.
   template <class Dataflow>
   [[gnu::always_inline]] JFPX_HD void run_dataflow(std::uint32_t n,
                                                    const Dataflow& dataflow) const {
@@ -106,7 +106,7 @@ class GridTeam {
     for (std::uint32_t i = first(); i - lane_id() < n; i += blocks_ * kThreads) {
       typename Dataflow::Item item;
       if (i < n) dataflow.begin(i, &item);
-      // All lanes at the same time: one after the other, they would take 32 times as long.
+      // All lanes wait together: one after the other, they would take 32 times as long.
       bool waits = i < n;
       while (__any_sync(kFullWarp, waits)) {
         if (waits) waits = !dataflow.is_ready(&item);
@@ -129,8 +129,8 @@ class GridTeam {
 #endif
   }
 
-  /// Calls place(i, size(0) + ... + size(i - 1)) for all i < n. Calls measure(i), which returns the
-  /// size, once, and then size(i). @returns the sum of all sizes
+  /// Calls place(i, size(0) + ... + size(i - 1)) for all i < n. The size of an item is measure(i)
+  /// in the first pass, called once, and size(i) in later passes. @returns the sum of all sizes
   template <class Measure, class Size, class Place>
   JFPX_HD auto scan(std::uint32_t n, const Measure& measure, const Size& size,
                     const Place& place) const -> decltype(size(0)) {
@@ -161,10 +161,10 @@ class GridTeam {
 #endif
   }
 
-  /// Calls place(i, position, bin) for all i < n with bin_of(i) < device::kBins: positions are
-  /// consecutive, and those of a bin follow those of the bins before, in any order within the bin.
+  /// Calls place(i, position, bin) for all i < n with bin_of(i) < device::kBins. Positions are
+  /// consecutive and ascend by bin; the order within a bin is arbitrary.
   /// @param bins  receives bin_of(i), which is called once
-  /// @param begin receives the first position of each bin, and the number of all
+  /// @param begin receives the first position of each bin, then the total number
   template <class BinOf, class Place>
   JFPX_HD void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* begin,
                          const BinOf& bin_of, const Place& place) const {
@@ -217,7 +217,7 @@ class GridTeam {
 #if defined(__CUDA_ARCH__)
   __device__ std::uint32_t first() const { return block_ * kThreads + threadIdx.x; }
 
-  /// The items of this block.
+  /// The chunk of items of this block.
   __device__ device::Range chunk_of(std::uint32_t n) const {
     const std::uint32_t tiles = (n + kThreads - 1) / kThreads;
     const std::uint32_t size = (tiles + blocks_ - 1) / blocks_ * kThreads;
@@ -226,7 +226,7 @@ class GridTeam {
             static_cast<std::uint32_t>(begin + size < n ? begin + size : n)};
   }
 
-  /// Sum of `value` before this thread in the block. @param sum receives that of all threads
+  /// Exclusive prefix sum of `value` in the block. @param sum receives the sum over all threads
   template <class Number>
   __device__ static Number block_scan(Number value, Number* sum) {
     __shared__ Number warp_sums[kThreads / 32];
@@ -249,7 +249,7 @@ class GridTeam {
     block_scan(value, &sum);
     return sum;
   }
-  /// Sum of the published sums of the first blocks.
+  /// Sum of the values that the first blocks have published.
   template <class Number>
   __device__ Number sum_of_blocks(std::uint32_t blocks) const {
     Number mine = 0;

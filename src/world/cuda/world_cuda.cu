@@ -43,7 +43,7 @@ class CudaDevice {
     const DeviceGuard guard(device_);
     JFPX_CUDA_TRY(
         cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device_));
-    // Enough for every program, so that it never moves: captured graphs have its address.
+    // Sized for every program, because captured graphs contain the address.
     const unsigned blocks = tuning::kMost * static_cast<unsigned>(multiprocessors_);
     scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
   }
@@ -75,15 +75,15 @@ class CudaDevice {
   void download(T* to, const T* from, std::size_t count) {
     transfer(to, from, count, cudaMemcpyDeviceToHost);
   }
-  /// Through page-locked memory, from which the pool copies: CUDA copies to other memory by one
-  /// thread, and in small pieces.
+  /// Copies through page-locked memory and then with the pool. CUDA copies to pageable memory with
+  /// one thread and in small pieces.
   void fetch(const device::HostCopies& copies, ThreadPool* pool) {
     const DeviceGuard guard(device_);
     std::size_t bytes = 0;
     for (const device::HostCopy& copy : copies) bytes += copy.bytes;
     try {
       staging_.reserve_geometric(bytes, "the states of a world");
-    } catch (const OutOfMemory&) {  // of page-locked memory
+    } catch (const OutOfMemory&) {  // page-locked memory is exhausted
       for (const device::HostCopy& copy : copies) {
         transfer(static_cast<std::byte*>(copy.to), static_cast<const std::byte*>(copy.from),
                  copy.bytes, cudaMemcpyDeviceToHost);
@@ -176,7 +176,7 @@ class CudaDevice {
     JFPX_CUDA_TRY(cudaStreamIsCapturing(stream, &status));
     return status != cudaStreamCaptureStatusNone;
   }
-  /// The work is captured from the user's stream. That of the world is not captured.
+  /// Captures the work from the user's stream, not from the stream of the world.
   template <class Work>
   void capture(Stream stream, const Work& work) {
     const DeviceGuard guard(device_);
@@ -188,7 +188,7 @@ class CudaDevice {
   }
 
   void mark(int i) { JFPX_CUDA_TRY(cudaEventRecord(marks_[i].get(), stream_.get())); }
-  /// 0 if a mark has failed, which does not affect the step.
+  /// 0 if recording an event has failed; the step is not affected.
   double elapsed_ms(int from, int to) const noexcept {
     float result = 0;
     if (cudaEventElapsedTime(&result, marks_[from].get(), marks_[to].get()) == cudaSuccess) {
@@ -201,7 +201,7 @@ class CudaDevice {
  private:
   /// Limits of the launches of a program.
   struct Launch {
-    std::size_t most_blocks = 0;  ///< that are resident at the same time; 0: not yet known
+    std::size_t most_blocks = 0;  ///< number of resident blocks; 0: not yet known
     bool has_clusters = false;
   };
 

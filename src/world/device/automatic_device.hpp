@@ -16,24 +16,24 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Starts the device when the time that it would have saved so far reaches the cost of starting it:
-/// on another thread, while the CPU makes all steps, or in the call if that cost is 0. The
-/// destructor waits for the other thread. Not thread-safe.
+/// Starts the device when the accumulated time that it would have saved reaches the cost of the
+/// start. The start runs on another thread while the CPU performs the steps, or in the call if the
+/// cost is 0. The destructor waits for that thread. Not thread-safe.
 class AutomaticDevice {
  public:
   using Maker = std::function<std::unique_ptr<DeviceWorld>()>;
 
-  /// @param make makes a device that is warm; called once, maybe on another thread
+  /// @param make creates a warm device; called once, possibly on another thread
   AutomaticDevice(const CostModel& costs, Maker make);
 
-  /// Returns the device once, when it has started; otherwise null.
-  /// @param failure receives the reason if it could not start, but not if there is no device
+  /// Returns the device once, after it has started; otherwise null.
+  /// @param failure receives the reason if the start fails, but not if there is no device
   std::unique_ptr<DeviceWorld> take_started(std::string* failure);
-  /// Whether the device, which has been taken, is to make the next step of a world.
+  /// Whether the device, which take_started() has returned, should perform the next step.
   bool choose(std::size_t bodies);
   /// Records the time of the step for which choose() was last called.
   void record(double us);
-  /// The CPU makes all later steps.
+  /// Selects the CPU for all later steps.
   void give_up();
   /// Reason for the last choice.
   ChoiceReason reason() const noexcept { return to_choice_reason(chooser_.reason()); }

@@ -18,7 +18,7 @@ class BodyBuffers {
  public:
   /// Copies all bodies to the device.
   /// @param room number of slots to reserve memory for
-  /// @param data gets the addresses
+  /// @param data receives the addresses
   void upload(const Transfer<Device>& transfer, const BodyStore& store, std::size_t room,
               StepData* data) {
     upload_properties(transfer, store.view(), room, &data->step.bodies);
@@ -27,7 +27,7 @@ class BodyBuffers {
                saved_);
   }
 
-  /// Copies forces, and what waking a body changes.
+  /// Copies forces, and the columns that change when a body wakes.
   void upload_forces(const Transfer<Device>& transfer, const MotionArrays& from) {
     transfer.put(&motion_.force, from.force);
     transfer.put(&motion_.torque, from.torque);
@@ -36,20 +36,20 @@ class BodyBuffers {
     transfer.put(&motion_.rest_time, from.rest_time);
   }
 
-  /// Copies of what BodyState has. @param to as large as the arrays that were uploaded
+  /// Copies of the columns of BodyState. @param to as large as the uploaded arrays
   HostCopies state_copies(MotionArrays* to) const {
     HostCopies copies;
     each_state(copy_to(&copies), *to, motion_);
     return copies;
   }
-  /// Copies of all other arrays, likewise.
+  /// Copies of all other arrays. @param to as large as the uploaded arrays
   HostCopies other_copies(MotionArrays* to) const {
     HostCopies copies;
     each_other_motion(copy_to(&copies), *to, motion_);
     return copies;
   }
 
-  /// Undoes what a step changes before it can fail.
+  /// Restores the columns that a step changes before it can fail.
   void restore(const Transfer<Device>& transfer, const StepData& data) const {
     const std::size_t n = data.step.bodies.capacity;
     each_saved([&](auto* to, const auto* from) { transfer.copy(to, from, n); }, data.step.motion,
@@ -80,7 +80,7 @@ class BodyBuffers {
     bodies->count = static_cast<std::uint32_t>(count);
   }
 
-  // What accumulates until the next step.
+  // Sums that accumulate until the next step.
   const Vec3* force() const { return motion_.force.data(); }
   const Vec3* torque() const { return motion_.torque.data(); }
 
@@ -90,7 +90,7 @@ class BodyBuffers {
 
   void upload_properties(const Transfer<Device>& transfer, const BodyView& from, std::size_t room,
                          BodyView* to) {
-    *to = from;  // the numbers; the pointers follow
+    *to = from;  // copies the numbers; the pointers are set below
     const auto put = [&](auto*& pointer, auto& buffer, const auto* values) {
       pointer = transfer.put(&buffer, values, from.capacity, room);
     };
@@ -115,7 +115,7 @@ class BodyBuffers {
   InertiaColumns<Buffer> inertia_;
   Buffer<std::uint64_t> ignored_, joined_;
   Buffer<BodyId> ids_[2];
-  int ids_now_ = 0;  ///< which of the two are the current ones
+  int ids_now_ = 0;  ///< index of the current buffer
   MotionColumns<Buffer> motion_;
   SavedColumns<Buffer> saved_;
 };

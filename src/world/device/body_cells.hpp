@@ -1,4 +1,4 @@
-/// Motion of a body during a step on a device, which the rows of its contacts change one after the
+/// Motion of a body during a step on a device. The rows of its contacts update it one after the
 /// other.
 #pragma once
 
@@ -14,11 +14,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Sequence numbers of the changes of a body, its tickets. Each sweep has kPerSweep of them: 1 + c
-/// for the row of color c, and the last one for the body itself, with its rows with fixed bodies. A
-/// row waits for the ticket of the body's previous row, and then sets its own. The tickets of
-/// colors that the body does not have are left out. Rows of the overflow keep the ticket before the
-/// sweep: barriers enclose them.
+/// Tickets: sequence numbers of the updates of a body. Each sweep has kPerSweep tickets: 1 + c for
+/// the row of color c, and the last one for the body itself, with its rows with fixed bodies. A row
+/// waits for the ticket of the previous row of the body, then publishes its own ticket. Colors
+/// without a row of the body have no tickets. Overflow rows do not change the ticket, because
+/// barriers enclose them.
 struct Tickets {
   static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
 
@@ -48,11 +48,11 @@ struct Tickets {
   }
 };
 
-/// A vector in cells, each of which has the same word besides numbers: in double, one number and
-/// half of the third one.
+/// A vector in cells of numbers and a word. All cells hold the same word. In double, a cell holds
+/// one number and half of the third one.
 class VectorCells {
  public:
-  static constexpr std::uint32_t kMixed = ~0u;  ///< its ticket is higher than all tickets
+  static constexpr std::uint32_t kMixed = ~0u;  ///< the cells differ; above all tickets
 
   VectorCells() = default;
   JFPX_HD VectorCells(const Vec3& vector, std::uint32_t word) {
@@ -100,18 +100,18 @@ class VectorCells {
   MemoryCell cells_[kCells];
 };
 
-/// Motion that the rows of a body read, in one line of the cache.
+/// Motion that the rows of a body read, in one cache line.
 struct alignas(16 * sizeof(Real)) MotionCells {
   VectorCells velocity, angular_velocity, shift, rotation;
 };
 
-/// Free motion, which a row reads only if it rebounds.
+/// Free motion, which only rebounding rows read.
 struct FreeCells {
   VectorCells velocity, angular_velocity;
 };
 
-/// Orientation of a body with joints, and the number of moves in the step that it has made. A move
-/// stores it before the velocities, so a row that has read these waits only for a short time.
+/// Orientation of a body with joints, and its number of moves in the step. A move stores the cells
+/// before the velocities, so a row that has read the velocities waits only for a short time.
 class OrientationCells {
  public:
   JFPX_HD void store(const Quat& orientation, std::uint32_t moves) {
@@ -133,9 +133,9 @@ class OrientationCells {
   VectorCells vector_, scalar_;
 };
 
-/// Access to the motion of a body as cells. The cells of the velocities are written at each ticket,
-/// all others when they may have changed: the words of the velocities contain the versions of the
-/// other cells that belong to them.
+/// Access to the motion of a body as cells. Every ticket writes the cells of the velocities, and
+/// writes other cells only if they may have changed. The words of the velocities contain the
+/// versions of the matching other cells.
 class BodyCells {
  public:
   /// Versions of the other vectors.
@@ -156,7 +156,7 @@ class BodyCells {
 
   /// Reads the motion after a ticket.
   /// @tparam kRotation whether to read the rotation
-  /// @returns whether the ticket has been made, and all of it is visible
+  /// @returns whether the ticket is published and all cells are visible
   template <bool kRotation>
   JFPX_HD bool read(std::uint32_t ticket, soft_step::SolverBody* body, Version* version) const {
     VectorCells v, w, s, r;
@@ -201,7 +201,7 @@ class BodyCells {
     VectorCells(free.velocity, version->free).store(&free_->velocity);
     VectorCells(free.angular_velocity, version->free).store(&free_->angular_velocity);
   }
-  /// Reads the free motion of a version that read() has returned. Its stores precede those of the
+  /// Reads the free motion of a version that read() has returned. It is stored before the
   /// velocities, so the wait is short.
   JFPX_HD soft_step::FreeMotion read_free(const Version& version) const {
     VectorCells v, w;
@@ -216,11 +216,11 @@ class BodyCells {
   static constexpr std::uint32_t kTicketBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTicketMask = (1u << kTicketBits) - 1;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
-  // Versions start again at 0 after 64 changes. A thread loads all cells of a body one right after
-  // the other, and each change takes at least a round trip to L2, so a cell that it loads is not 64
+  // Versions restart at 0 after 64 changes. A thread loads all cells of a body in immediate
+  // succession, and each change takes at least a round trip to L2, so a loaded cell is less than 64
   // changes older than another.
-  // All tickets are below that of VectorCells::kMixed. The sweeps of a step are the warm start,
-  // those of the substeps and the restitution.
+  // All tickets are below VectorCells::kMixed. The sweeps of a step are the warm start, the sweeps
+  // of the substeps, and the restitution.
   static_assert((soft_step::kSweepsPerSubstep * kMaxSubsteps + 2) * Tickets::kPerSweep <
                 kTicketMask);
 
@@ -228,7 +228,7 @@ class BodyCells {
   FreeCells* free_;
 };
 
-/// Constants of a body during a step, which its rows read.
+/// Constants of a body during a step, for its rows.
 struct alignas(16) RowBody {
   Real inverse_mass = 0;     ///< as SolverBody
   Real inverse_inertia = 0;  ///< as SolverBody

@@ -8,8 +8,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. Has no effect, except
-/// that it counts the step, if the step cannot be completed or a body has run away.
+/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. If the step cannot be
+/// completed or a body has left the world, it only counts the step.
 struct CommitProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kCommit;
   StepData data;

@@ -17,11 +17,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// The contact set of a step, and what World::contacts() needs.
+/// The contact set of a step, and data for World::contacts().
 template <class Device>
 class ContactBuffers {
  public:
-  /// The contacts become those of another set. Waits for the copies.
+  /// Replaces the contacts by another set. Waits for the copies.
   /// @param room number of slots of bodies to reserve memory for
   void upload(const Transfer<Device>& transfer, const soft_step::ContactView& from,
               std::size_t room) {
@@ -30,7 +30,7 @@ class ContactBuffers {
     transfer.put(&manifolds_, from.manifolds, from.manifold_count);
     transfer.put(&points_, from.points, from.point_count);
     transfer.put(&impulses_, from.impulses, std::size_t{from.sphere_count} + from.point_count);
-    // A device always has the rolling impulses.
+    // A device always stores the rolling impulses.
     const std::vector<Vec3> none(from.rolling_impulses != nullptr ? 0 : from.size());
     transfer.put(&rolling_impulses_, none.empty() ? from.rolling_impulses : none.data(),
                  from.size());
@@ -39,7 +39,7 @@ class ContactBuffers {
     put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, room);
   }
 
-  /// Makes room for the contacts that a step finds, and keeps those of an earlier step.
+  /// Reserves memory for the contacts of the next step, and keeps those of the last step.
   /// @param room number of slots of bodies, as in the last upload
   void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room) {
     const std::size_t contacts = std::size_t{capacity.spheres} + capacity.candidates;
@@ -56,7 +56,7 @@ class ContactBuffers {
     transfer.room(&manifolds_of_, room);
     transfer.room(&position_before_, room);
   }
-  /// A complete step has found these numbers of contacts. @param slots of bodies in the step
+  /// Records the contact counts of a completed step. @param slots of bodies in the step
   void complete(const ContactSizes& sizes, std::size_t slots) {
     sizes_ = sizes;
     slots_ = slots;
@@ -90,7 +90,7 @@ class ContactBuffers {
     transfer.wait();
   }
 
-  /// What detection leaves on the host, for ContactListMaker.
+  /// Copies the detected contacts that ContactListMaker reads.
   void fetch_detected(const Transfer<Device>& transfer, const BodiesOfStep& bodies,
                       DetectedContacts* detected) const {
     std::vector<Touch> touches(sizes_.touches);
@@ -125,7 +125,7 @@ class ContactBuffers {
     array->swap(larger);
   }
 
-  /// By body a: its range of a list that is sorted by it.
+  /// By body a: its range of a list that is sorted by body a.
   template <class C>
   static void put_ranges(const Transfer<Device>& transfer, Buffer<Range>* to, const C* contacts,
                          std::uint32_t count, std::size_t room) {

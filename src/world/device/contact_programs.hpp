@@ -10,8 +10,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Starts the step, unless a ForceProgram has, and makes the bounds of the motion of all
-/// sub-shapes.
+/// Starts the step, unless a ForceProgram has started it, and computes the bounds of the motion of
+/// all sub-shapes.
 struct BoundsProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kBounds;
   StepData data;
@@ -36,7 +36,7 @@ struct BoundsProgram {
   }
 
  private:
-  /// Makes the bounds of the kinematic solids, level by level.
+  /// Computes the bounds of the kinematic solids, level by level.
   template <class Team>
   JFPX_HD void refit(const Team& team, const BlockTreeView& tree) const {
     team.sync();
@@ -66,7 +66,7 @@ struct BoundsProgram {
   }
 };
 
-/// Makes the contacts of two spheres from the pairs of swept bounds, and lists all other pairs.
+/// Computes the contacts of two spheres from the pairs of swept bounds, and lists all other pairs.
 struct SphereProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSphere;
   StepData data;
@@ -119,7 +119,7 @@ struct SphereProgram {
     data.candidates[place] = ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b);
   }
 
-  /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may meet.
+  /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may touch.
   JFPX_HD void find_fixed(std::uint32_t i) const {
     if (!data.step.bodies.movable(data.swept_bounds.sub_shapes.body(i))) return;
     data.swept_bounds.visit_fixed(i, data.trees,
@@ -149,7 +149,7 @@ struct SphereProgram {
   }
 };
 
-/// Makes the contacts of all other sub-shapes.
+/// Computes the contacts of all other sub-shapes.
 struct ShapeProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kShape;
   StepData data;
@@ -210,7 +210,7 @@ struct ShapeProgram {
     }
   }
 
-  /// Makes the manifolds of a body a, sorted by key. @param sizes of the manifolds before
+  /// Builds the manifolds of a body a, sorted by key. @param sizes exclusive prefix sum of sizes
   JFPX_HD void add_manifolds(std::uint32_t body, std::uint64_t sizes) const {
     const StepData& d = data;
     auto manifold = static_cast<std::uint32_t>(sizes >> 32);
@@ -230,7 +230,7 @@ struct ShapeProgram {
                                             0};
       for (std::uint32_t k = 0; k < found.point_count; ++k, ++point) {
         if (point >= d.capacity.points) continue;
-        // Members, because the padding of a point is not initialized.
+        // Copies the members, because the padding of a point is not initialized.
         const soft_step::PointInput& p = found.points[k];
         d.now().view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature};
       }

@@ -30,24 +30,24 @@ namespace device {
 
 inline constexpr int kMarks = 4;
 
-/// @tparam Device owns a stream of work, or imitates one on the host:
-///   - `number()`, `stream()`: as cuda::DeviceStates;
+/// @tparam Device owns a stream of work, or emulates one on the host:
+///   - `number()`, `stream()`: see cuda::DeviceStates;
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
 ///   - `reserve(&buffer, count, what)`, `reserve_exactly(&buffer, count, what)`: makes the capacity
 ///     at least `count`, with and without slack, and discards the contents; `release_unused()`:
 ///     gives memory of smaller buffers back;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
-///   - `fetch(copies, pool)`: makes HostCopies, and waits;
-///   - `find_pairs(spheres, n, pairs, capacity, count)`: as cuda::DeviceSphereCollider, after
+///   - `fetch(copies, pool)`: performs HostCopies, and waits;
+///   - `find_pairs(spheres, n, pairs, capacity, count)`: see cuda::DeviceSphereCollider, after
 ///     `reserve_pairs(n, capacity)`;
 ///   - `run(program, items)`: runs program(team) with about one thread per item;
-///   - `wait()`: until all work is complete; `wait_for_graphs()`: until all launched graphs are;
-///   - `fork(stream)`, `join(stream)`: later work of this object waits for earlier work of another
-///     stream, and the other way round;
-///   - `is_capturing(stream)`: whether it is being captured; `capture(stream, work)`: calls work(),
-///     whose programs and searches become part of the graph;
-///   - `mark(i)`: marks a point of the work, i < kMarks; `elapsed_ms(i, j)`: the time between two
-///     points, once all work is complete.
+///   - `wait()`: waits for all work; `wait_for_graphs()`: waits for all launched graphs;
+///   - `fork(stream)`: later work of this object waits for earlier work of `stream`;
+///     `join(stream)`: later work of `stream` waits for earlier work of this object;
+///   - `is_capturing(stream)`: whether the stream is being captured; `capture(stream, work)`: calls
+///     work(), whose programs and searches become part of the graph;
+///   - `mark(i)`: records an event, i < kMarks; `elapsed_ms(i, j)`: the time between two events,
+///     once all work is complete.
 template <class Device>
 class DeviceStep final : public DeviceWorld {
  public:
@@ -107,7 +107,7 @@ class DeviceStep final : public DeviceWorld {
     std::vector<EditedBody> edited;
     std::vector<EditedMass> masses;
     std::vector<SlotValues> replaced;
-    std::vector<std::uint32_t> changed;  // slots whose body has come or gone
+    std::vector<std::uint32_t> changed;  // slots whose body was added or removed
     std::vector<BodyId> added;
     edited.reserve(edits.size());
     bool visits_contacts = false, sets_pairs = false;
@@ -216,7 +216,7 @@ class DeviceStep final : public DeviceWorld {
     if (has_graph()) device_->wait_for_graphs();
     const Counters found = counters();
     const Progress& progress = found.progress;
-    if (progress.deferred > 0) deferred_ = progress.deferred;  // or a failed call has found them
+    if (progress.deferred > 0) deferred_ = progress.deferred;  // else that of a failed call
     if (progress.deferred > 0 || progress.started != 0) restore(progress);
     Finished result{progress.completed - known_.completed, deferred_, result_of(found)};
     note(progress);
@@ -288,8 +288,8 @@ class DeviceStep final : public DeviceWorld {
   }
 
   /// Updates the ids and the sub-shapes. Waits.
-  /// @param changed slots whose body has come or gone
-  /// @param added   the bodies that have come, in any order
+  /// @param changed slots whose body was added or removed
+  /// @param added   the added bodies, in any order
   void merge(const BodyStore& bodies, const std::vector<std::uint32_t>& changed,
              std::vector<BodyId>* added) {
     std::ranges::sort(*added, {}, &BodyId::index);
@@ -323,14 +323,14 @@ class DeviceStep final : public DeviceWorld {
   /// DeviceStates::version; never 0 after an upload.
   std::uint64_t version() const { return transfer_.moves() + changes_; }
 
-  /// Between two steps, contacts_[now()] are those of the step before the last.
+  /// Index of the contacts of the step before the last, between two steps.
   std::uint64_t now() const { return known_.completed & 1; }
   Contacts& last_contacts() { return contacts_[1 - now()]; }
   void use_contacts() {
     for (int i = 0; i < 2; ++i) data_.contacts_of[i] = contacts_[i].view();
   }
 
-  /// Selects what acts in a step, apart from accumulated forces. @param table null: nothing
+  /// Selects the forces of a step, apart from accumulated forces. @param table null: no forces
   void select_forces(const ForceTable* table) {
     BodyView& bodies = data_.step.bodies;
     bodies.force = bodies_.force();
@@ -344,7 +344,7 @@ class DeviceStep final : public DeviceWorld {
     bodies.torque = torque_sum_;
   }
 
-  /// Whether prepare() has nothing to do. Only forces depend on the number of the step.
+  /// Whether prepare() has no work. Only forces depend on the step number.
   bool is_prepared(const ForceTable* forces, std::uint64_t steps) const {
     return is_ready_ && !is_held() &&
            (forces == nullptr || (offset(steps) == sent_.offset && forces_.has(*forces)));
@@ -353,7 +353,7 @@ class DeviceStep final : public DeviceWorld {
   /// Progress::offset
   std::uint64_t offset(std::uint64_t steps) const { return steps - known_.completed; }
 
-  /// Sends what the host knows of the progress, so that steps may have effects.
+  /// Copies the progress of the host to the device, which enables steps.
   void release(std::uint64_t steps) {
     const auto send = [this](auto Progress::*field, auto value) {
       if (sent_.*field == value) return;
@@ -365,15 +365,15 @@ class DeviceStep final : public DeviceWorld {
     send(&Progress::held, 0u);
   }
 
-  /// Grows the lists that were too short, and some more: much more, if a step without room leaves
-  /// those after it to the host.
+  /// Grows the lists that were too short, with slack. Steps in a queue get more slack, because the
+  /// host must perform all steps after one whose lists are too short.
   void grow_lists(const Capacity& needed) {
     capacity_.grow(needed, is_queued_);
     is_ready_ = false;
     ++changes_;
   }
 
-  /// Makes room for a step, which then allocates nothing.
+  /// Reserves memory, so that the step allocates nothing.
   void make_room() {
     if (is_ready_) return;
     const std::uint64_t moves = transfer_.moves();
@@ -424,7 +424,7 @@ class DeviceStep final : public DeviceWorld {
     return result;
   }
 
-  /// Undoes what a step that is not complete has changed.
+  /// Restores the state after an incomplete step.
   void restore(const Progress& progress) {
     if (progress.started != 0) bodies_.restore(transfer_, data_);
     source_ = progress;
@@ -434,7 +434,7 @@ class DeviceStep final : public DeviceWorld {
     device_->wait();
   }
 
-  /// Steps have been completed.
+  /// Records the number of completed steps.
   void note(const Progress& progress) {
     for (; known_.completed < progress.completed; ++known_.completed) {
       if (known_.completed + 2 < progress.completed) continue;
@@ -452,8 +452,8 @@ class DeviceStep final : public DeviceWorld {
     return result;
   }
 
-  /// Runs the programs, again with more room if a list was too short. If the device fails, or the
-  /// step has no effect for another reason, restores the state.
+  /// Runs the programs; repeats them with longer lists if a list was too short. Restores the state
+  /// if the device fails or the step has no effect for another reason.
   Counters run_until_complete() {
     for (;;) {
       try {
@@ -482,18 +482,18 @@ class DeviceStep final : public DeviceWorld {
   Capacity capacity_;
   BodyBuffers<Device> bodies_;
   SubShapes sub_shapes_[2], added_shapes_;
-  int sub_shapes_now_ = 0;  ///< which of the two are those of the bodies
+  int sub_shapes_now_ = 0;  ///< index of the current sub-shapes
   FixedTreeBuffers<Device> trees_;
   JointBuffers<Device> joints_;
   ForceBuffers<Device> forces_;
-  Contacts contacts_[2];  ///< as Progress::contacts
+  Contacts contacts_[2];  ///< indexed as Progress::contacts
   ScratchBuffers<Device> scratch_;
-  std::size_t room_ = 0;             ///< number of slots that the buffers of bodies have memory for
-  Progress known_;                   ///< of the steps that the host has waited for
-  Progress sent_;                    ///< Progress::offset and held, as the device has them
+  std::size_t room_ = 0;             ///< number of slots with memory in the buffers of bodies
+  Progress known_;                   ///< of the steps for which the host has waited
+  Progress sent_;                    ///< Progress::offset and held, as last copied to the device
   Progress source_;                  ///< of copies to the device
-  std::uint64_t deferred_ = 0;       ///< for finish(), if a call of it fails
-  std::uint64_t changes_ = 0;        ///< of arguments of the programs, apart from addresses
+  std::uint64_t deferred_ = 0;       ///< for finish(), if one of its calls fails
+  std::uint64_t changes_ = 0;        ///< counts changes of program arguments, except addresses
   std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
   bool has_stepped_ = false;         ///< whether a step was completed since the upload
   bool is_queued_ = false;           ///< whether the host has enqueued or captured steps

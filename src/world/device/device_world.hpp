@@ -1,4 +1,4 @@
-/// The state of a world that lies on a device between steps.
+/// Interface of a world whose state stays on a device between steps.
 #pragma once
 
 #include <jfpx/cuda/world.hpp>
@@ -20,16 +20,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A change of a body between two steps. The forces and properties of the body are always those of
-/// the host, except mass and inertia.
+/// A change of a body between two steps. Forces and properties of the body are copied from the
+/// host; mass and inertia only with `sets_mass`.
 struct BodyEdit {
-  bool sets_state = false;       ///< position, orientation and velocities are those of the host
-  bool sets_mass = false;        ///< mass and inertia in body axes are those of the host
-  bool sets_pairs = false;       ///< the ignored pairs of the world are those of the host
+  bool sets_state = false;       ///< copies position, orientation and velocities from the host
+  bool sets_mass = false;        ///< copies mass and inertia in body axes from the host
+  bool sets_pairs = false;       ///< copies the ignored pairs of the world from the host
   bool wakes = false;            ///< wakes the body
-  bool wakes_neighbors = false;  ///< wakes the bodies in contact with it in the last step
-  bool is_removed = false;       ///< the body that had the index in the last step was removed
-  bool is_added = false;         ///< the body that has the index now is new
+  bool wakes_neighbors = false;  ///< wakes the bodies in contact with the body in the last step
+  bool is_removed = false;       ///< removes the body that had the index in the last step
+  bool is_added = false;         ///< adds the body that has the index now
 };
 /// By BodyId::index.
 using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
@@ -37,12 +37,11 @@ using BodyEdits = std::unordered_map<std::uint32_t, BodyEdit>;
 /// Steps of Solver::soft_step on a device, with the bits of SoftStep. The caller uploads a world,
 /// then calls step() any number of times, and fetches the results that it needs. Not thread-safe.
 ///
-/// Steps that do not wait for the host: after enqueue() or capture(), finish() must precede all
-/// functions but enqueue(), capture(), is_capturing(), has_graph(), is_held(), wait_for() and
-/// states().
+/// Steps that do not wait for the host: after enqueue() or capture(), only enqueue(), capture(),
+/// is_capturing(), has_graph(), is_held(), wait_for() and states() may be called until finish().
 ///
-/// All functions but the destructor throw DeviceError if the device fails, and OutOfMemory. After a
-/// failed step(), the state on the device is that before the step.
+/// All functions but the destructor throw DeviceError if the device fails, and OutOfMemory. A
+/// failed step() restores the state before the step.
 class DeviceWorld {
  public:
   struct Result {
@@ -51,18 +50,18 @@ class DeviceWorld {
     std::uint32_t awake = 0;            ///< movable bodies awake after the step
     /// Device times: forces, contact search, all other stages.
     double forces_ms = 0, detect_ms = 0, resolve_ms = 0;
-    std::optional<std::uint32_t> runaway;  ///< first body that is_in_world() refuses
-    /// The bounds of a body's motion are not finite: the step had no effect, and SoftStep reports
-    /// the error.
+    std::optional<std::uint32_t> runaway;  ///< first body for which is_in_world() is false
+    /// The bounds of a body's motion are not finite. The step had no effect; SoftStep reports the
+    /// error on the host.
     bool invalid_bounds = false;
-    /// A force must wake a body: the step had no effect, and the host is to apply the forces.
+    /// A force must wake a body. The step had no effect; the host must apply the forces.
     bool must_wake = false;
   };
-  /// Steps that finish() has found.
+  /// Result of finish().
   struct Finished {
     std::uint64_t completed = 0;  ///< number of complete steps
-    std::uint64_t deferred = 0;   ///< number of steps after them that the caller must make
-    Result last;                  ///< of the last complete step, if none is missing; without times
+    std::uint64_t deferred = 0;   ///< number of later steps that the caller must perform
+    Result last;                  ///< of the last completed step if `deferred` is 0; without times
   };
 
   virtual ~DeviceWorld() = default;
@@ -73,58 +72,58 @@ class DeviceWorld {
   /// @param last contacts of the last step, with their impulses and colors
   virtual void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
                       soft_step::ContactSet* last) = 0;
-  /// Replaces forces and torques, and which bodies are awake.
+  /// Replaces forces, torques and awake flags.
   virtual void upload_forces(const BodyStore& bodies) = 0;
-  /// Replaces the joints, and what they keep from the last step. upload() must precede. Waits.
+  /// Replaces the joints and their impulses of the last step. upload() must precede. Waits.
   virtual void upload_joints(JointStore* joints) = 0;
   /// Whether edit() may add bodies with indices below `slots`.
   virtual bool has_room(std::size_t slots) const noexcept = 0;
   /// Edits bodies of the state on the device. The same edits may be repeated after a failure. May
-  /// return before the device is done.
+  /// return before the device has completed them.
   virtual void edit(const BodyStore& bodies, const BodyEdits& edits) = 0;
-  /// One step. If a body runs away, the state does not change.
-  /// @param forces act in this step, as far as they wake no body; null: none
-  /// @param steps  World::steps(), which gives the time
+  /// Performs one step. If a body leaves the world, the state does not change.
+  /// @param forces of this step, except those that would wake a body; null: none
+  /// @param steps  World::steps(), which determines the time
   virtual Result step(const ForceTable* forces, std::uint64_t steps) = 0;
 
-  /// Sends the forces, and makes room, so that capture() can follow. Enables steps after hold().
-  /// Waits.
-  /// @param forces,steps as for step(), like those of the functions below
+  /// Copies the forces and reserves memory, so that capture() can follow. Enables steps after
+  /// hold(). Waits.
+  /// @param forces,steps as in step(), also for the functions below
   virtual void prepare(const ForceTable* forces, std::uint64_t steps) = 0;
-  /// Enqueues steps, before later work of a stream. wait_for(stream) must precede. Waits only
-  /// if lists move. If a step cannot be completed, the later ones have no effect.
-  /// @param left number of steps; becomes that of those which were not enqueued, if that fails
+  /// Enqueues steps, before later work of a stream. wait_for(stream) must precede. Waits only if
+  /// lists are reallocated. If a step cannot be completed, all later steps have no effect.
+  /// @param left number of steps; if enqueuing fails, receives the number that were not enqueued
   virtual void enqueue(const ForceTable* forces, std::uint64_t steps, cuda::Stream stream,
                        std::uint64_t* left) = 0;
   virtual bool is_capturing(cuda::Stream stream) = 0;
-  /// Adds steps to the CUDA graph that is being captured from a stream. The graph is valid as long
-  /// as the version of states().
+  /// Adds steps to the CUDA graph that is being captured from a stream. The graph is valid while
+  /// the version of states() is unchanged.
   /// @returns false, without effect, if prepare() or a step since upload() is missing
   virtual bool capture(const ForceTable* forces, std::uint64_t steps, std::uint32_t count,
                        cuda::Stream stream) = 0;
   /// Whether the last captured graph is valid.
   virtual bool has_graph() const noexcept = 0;
-  /// Until step(), enqueue() or prepare(), steps of captured graphs have no effect. Waits.
+  /// Disables the steps of captured graphs until step(), enqueue() or prepare(). Waits.
   virtual void hold() = 0;
   virtual bool is_held() const noexcept = 0;
-  /// Later work of the world waits for earlier work of a stream.
+  /// Makes later work of the world wait for earlier work of a stream.
   virtual void wait_for(cuda::Stream stream) = 0;
-  /// Waits for all steps, also of the graphs that have been launched. The state is then that after
-  /// the last complete one. May be repeated after a failure.
+  /// Waits for all steps, including those of launched graphs. The state is then that after the last
+  /// completed step. May be repeated after a failure.
   virtual Finished finish() = 0;
 
-  /// The states on the device, with the lifetimes of cuda::device_states().
+  /// The states on the device, with the lifetimes that cuda::device_states() documents.
   virtual cuda::DeviceStates states() const noexcept = 0;
   virtual Vec3 fetch_position(std::uint32_t body) = 0;
-  /// Copies what BodyState has of all bodies to the host. @param pool makes a part of the copies
+  /// Copies the columns of BodyState of all bodies to the host. @param pool copies in parallel
   virtual void fetch_states(MotionArrays* moving, ThreadPool* pool) = 0;
-  /// Copies the rest of the motion of all bodies to the host, likewise.
+  /// Copies the other motion columns of all bodies to the host. @param pool copies in parallel
   virtual void fetch_other_motion(MotionArrays* moving, ThreadPool* pool) = 0;
   /// Copies the contacts of the last step, with their impulses and colors.
   virtual void fetch_contact_set(soft_step::ContactSet* last) = 0;
-  /// Copies what the joints have kept in the last step.
+  /// Copies the impulses and colors of the joints of the last step.
   virtual void fetch_joints(JointStore* joints) = 0;
-  /// Copies what ContactListMaker needs, of the last step or of the step before it.
+  /// Copies the data for ContactListMaker, of the last step or of the step before it.
   virtual void fetch_contacts(const BodiesOfStep& bodies, bool of_step_before,
                               soft_step::ContactSet* set, DetectedContacts* detected) = 0;
 };

@@ -26,8 +26,8 @@ struct EditedMass {
   InertiaColumns<ValueColumn> inertia;
 };
 
-/// Wakes the bodies in contact with some of the edited bodies, forgets the contacts of removed
-/// bodies, edits the bodies, and then replaces some.
+/// Wakes the bodies in contact with edited bodies, discards the contacts of removed bodies, edits
+/// the bodies, and then replaces slots.
 struct EditProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kEdit;
   StepData data;
@@ -53,8 +53,8 @@ struct EditProgram {
  private:
   static constexpr std::uint8_t kWakesNeighbors = 1, kIsRemoved = 2;
 
-  /// Wakes neighbors, and marks the contacts of removed bodies, because new bodies may have their
-  /// slots: MatchProgram does not match a contact without color.
+  /// Wakes neighbors, and removes the color of contacts of removed bodies, because new bodies may
+  /// reuse their slots: MatchProgram ignores contacts without color.
   template <class Team>
   JFPX_HD void visit_contacts(const Team& team) const {
     const StepData& d = data;

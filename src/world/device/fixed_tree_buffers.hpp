@@ -16,7 +16,8 @@ template <class Device>
 class FixedTreeBuffers {
  public:
   /// Builds the trees on the host and copies them, unless the bodies of mass 0 are those of the
-  /// last call. The bounds of kinematic solids are not valid: the device makes them in every step.
+  /// last call. The bounds of kinematic solids are not valid: the device computes them in every
+  /// step.
   /// @param margin SweptBounds::largest_margin
   /// @returns whether the trees are new
   bool upload(const Transfer<Device>& transfer, const BodyStore& bodies, Real margin) {

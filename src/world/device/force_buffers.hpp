@@ -17,7 +17,7 @@ namespace device {
 template <class Device>
 class ForceBuffers {
  public:
-  /// Uploads what has changed since the last call. @returns whether the lists have changed
+  /// Copies the changes since the last call. @returns whether the lists have changed
   bool upload(const Transfer<Device>& transfer, const ForceTable& table) {
     const ForceView from = table.view();
     const bool has_new_lists = lists_version_ != table.lists_version();
@@ -27,7 +27,7 @@ class ForceBuffers {
     lists_version_ = table.lists_version();
     return has_new_lists;
   }
-  /// Whether upload() would do nothing.
+  /// Whether upload() would copy nothing.
   bool has(const ForceTable& table) const {
     return parameters_version_ == table.parameters_version() &&
            lists_version_ == table.lists_version();
@@ -36,7 +36,7 @@ class ForceBuffers {
   void clear() { parameters_version_ = lists_version_ = 0; }
 
   const ForceView& view() const { return view_; }
-  /// Sums of what acts on each body in a step.
+  /// Sums of the forces on each body in a step.
   Vec3* force_sums(const Transfer<Device>& transfer, std::size_t bodies) {
     return transfer.room_to_grow(&force_sum_, bodies);
   }

@@ -11,7 +11,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// A body on which forces act one after the other.
+/// A body that accumulates forces in order.
 class ForcedBody {
  public:
   JFPX_HD ForcedBody(const StepData& data, const ForceView& forces, std::uint32_t body)
@@ -66,7 +66,7 @@ class ForcedBody {
     return {bodies.position[body], bodies.orientation[body], bodies.velocity[body],
             bodies.angular_velocity[body]};
   }
-  /// A body must wake up.
+  /// Defers the step to the host, because a force must wake a body.
   JFPX_HD void leave_to_host() const { data_.counters->failed = data_.counters->must_wake = 1; }
 
   const StepData& data_;
@@ -75,8 +75,8 @@ class ForcedBody {
   Vec3 force_, torque_;
 };
 
-/// Starts the step, and adds all forces to those that the bodies have accumulated. A body depends
-/// on no other one, because steps in which a force would wake a body are deferred to the host.
+/// Starts the step, and adds all forces to the accumulated forces of the bodies. Bodies are
+/// independent, because steps in which a force would wake a body are deferred to the host.
 struct ForceProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kForce;
   StepData data;

@@ -1,4 +1,4 @@
-/// What the host has of a World whose state is on a device.
+/// The host's copy of a World whose state is on a device.
 #pragma once
 
 #include "src/world/bodies/bodies_of_step.hpp"
@@ -12,28 +12,29 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Which of the host and the device has the state, what the host has fetched, and what it has yet
-/// to send. All but `holder` and `departures` has a meaning while the device has the state.
+/// Tracks whether the host or the device owns the state, which data the host has fetched, and which
+/// changes are pending. All members but `holder` and `departures` apply only while the device owns
+/// the state.
 struct HostMirror {
   enum class Holder { host, device };
-  /// What the arrays of the bodies have of the motion on the device.
+  /// Validity of the motion columns on the host.
   enum class Motion {
     stale,
-    states,  ///< what BodyState has, of all bodies but those with edits
+    states,  ///< the columns of BodyState are valid for all bodies without edits
     all,
   };
   enum class Joints { equal, newer_on_host, newer_on_device };
 
   bool is_resident() const noexcept { return holder == Holder::device; }
 
-  /// The device has received the state.
+  /// Records that the device owns the state.
   void enter() noexcept {
     holder = Holder::device;
     motion = Motion::all;
     joints = Joints::equal;
     has_contact_set = true;
   }
-  /// The host has the state, and the device no longer.
+  /// Records that the host owns the state and the device copy is invalid.
   void leave() noexcept {
     holder = Holder::host;
     ++departures;
@@ -42,11 +43,11 @@ struct HostMirror {
     changed_before.clear();
     joints = Joints::equal;
   }
-  /// An edit changes more on the device than BodyState.
+  /// Records an edit that changes columns outside BodyState on the device.
   void invalidate_other_motion() noexcept { motion = std::min(motion, Motion::states); }
-  /// The device has completed steps.
+  /// Records completed steps of the device.
   void complete_steps(std::uint64_t count, bool any_joints) {
-    if (count > 1) changed.clear();  // the step before the last is one of them
+    if (count > 1) changed.clear();  // the step before the last is part of this call
     changed_before.swap(changed);
     changed.clear();
     forced_bodies.clear();
@@ -59,11 +60,11 @@ struct HostMirror {
   Motion motion = Motion::all;
   Joints joints = Joints::equal;
   bool has_contact_set = true;
-  BodyEdits edits;  ///< which the device does not have yet
-  /// Bodies that contact lists of the last step, and of the step before it, show otherwise than
-  /// they are now.
+  BodyEdits edits;  ///< pending edits
+  /// Former values of bodies that have changed since the last step, or since the step before it,
+  /// for their contact lists.
   ListedBodies changed, changed_before;
-  /// Bodies whose forces on the host are those of the next step; those of all others are 0 there.
+  /// Bodies with accumulated forces on the host; the host columns are 0 for all other bodies.
   std::vector<std::uint32_t> forced_bodies;
   /// Number of times that leave() was called.
   std::atomic<std::uint64_t> departures{0};

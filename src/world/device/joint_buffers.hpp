@@ -15,8 +15,8 @@ namespace device {
 template <class Device>
 class JointBuffers {
  public:
-  /// The joints become those of the host. Waits for the copies.
-  /// @param last index of what the joints keep from the last step, in DeviceJoints::kept
+  /// Replaces the joints by those of the host. Waits for the copies.
+  /// @param last index in DeviceJoints::kept of the impulses of the last step
   /// @param room number of slots of bodies to reserve memory for
   void upload(const Transfer<Device>& transfer, const soft_step::JointView& from,
               std::uint64_t last, std::size_t room, StepData* data) {

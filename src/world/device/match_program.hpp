@@ -10,11 +10,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Gives each contact and joint the impulses and the color that it had in the last step, and colors
-/// the others: as soft_step::ContactCache.
+/// Assigns each contact and joint its impulses and color of the last step, and colors the
+/// remaining ones: the device version of soft_step::ContactCache.
 struct MatchProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kMatch;
-  /// Up to this number of contacts, one block colors them: its barriers are faster.
+  /// Up to this number of contacts, a single block colors them: its barriers are faster.
   static constexpr std::uint32_t kFewContacts = 4096;
   StepData data;
 
@@ -113,7 +113,7 @@ struct MatchProgram {
     return keep(now, i, last, last.sphere_count + before);
   }
 
-  /// Keeps the rolling impulse, and the color if there is one. @returns whether there is one
+  /// Keeps the rolling impulse and the color, if any. @returns whether there is a color
   JFPX_HD bool keep(const soft_step::ContactView& now, std::uint32_t i,
                     const soft_step::ContactView& last, std::uint32_t before) const {
     now.rolling_impulses[i] = last.rolling_impulses[before];
@@ -126,7 +126,7 @@ struct MatchProgram {
     return true;
   }
 
-  /// As ContactCache::match_joints() and SoftStep::find_near().
+  /// Device version of ContactCache::match_joints() and SoftStep::mark_constrained().
   JFPX_HD void match_joint(std::uint32_t joint) const {
     const StepData& d = data;
     const soft_step::JointView joints = d.joints();
@@ -149,8 +149,8 @@ struct MatchProgram {
     joints.now[joint] = now;
   }
 
-  /// Colors in rounds: a contact gets its color when it is the first of the uncolored ones at both
-  /// bodies, which gives the colors of the sequential order.
+  /// Colors in rounds. A contact gets its color when it precedes all uncolored contacts of both
+  /// bodies, which yields the colors of the sequential algorithm.
   template <class Team>
   JFPX_HD void color(const Team& team) const {
     const StepData& d = data;
@@ -166,7 +166,7 @@ struct MatchProgram {
         atomic_min(&d.first_order[key.a], order);
         atomic_min(&d.first_order[key.b], order);
       });
-      // Contacts with the same value of color_order() are served by their index.
+      // Contacts with the same color_order() are ordered by index.
       team.for_each(left, [&](std::uint32_t k) {
         const soft_step::ContactKey key = setup.key(list[k]);
         const std::uint64_t order = soft_step::color_order(key);

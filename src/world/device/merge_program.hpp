@@ -1,4 +1,4 @@
-/// Ids and sub-shapes of a world on a device after bodies have come or gone.
+/// Update of ids and sub-shapes on a device after bodies were added or removed.
 #pragma once
 
 #include "src/world/device/step_data.hpp"
@@ -27,8 +27,8 @@ inline SubShapeRanges operator+(const SubShapeRanges& a, const SubShapeRanges& b
   return sum;
 }
 
-/// Merges the kept items of a sorted array with another sorted array, which must not have the keys
-/// of kept items.
+/// Merges the kept items of a sorted array with a sorted array of added items, whose keys must
+/// differ from those of kept items.
 /// @param key_of,added_key_of  keys by item, ascending
 /// @param copy_kept,copy_added receive an item of the arrays and its place in the merged one
 template <class Team, class KeyOf, class IsKept, class AddedKeyOf, class CopyKept, class CopyAdded>
@@ -36,7 +36,7 @@ JFPX_HD void merge_sorted(const Team& team, std::uint32_t n, const KeyOf& key_of
                           const IsKept& is_kept, std::uint32_t added_count,
                           const AddedKeyOf& added_key_of, const CopyKept& copy_kept,
                           const CopyAdded& copy_added) {
-  // Number of added items up to the key of an item.
+  // Number of added items whose key is at most that of an item.
   const auto added_up_to = [&](std::uint32_t i) {
     const auto key = key_of(i);
     std::uint32_t first = 0, last = added_count;
@@ -63,12 +63,12 @@ JFPX_HD void merge_sorted(const Team& team, std::uint32_t n, const KeyOf& key_of
                 [&](std::uint32_t k) { copy_added(begin + k, kept + begin + k); });
 }
 
-/// Makes the sorted ids and the sub-shapes from those before: without the ones of `changed` bodies,
-/// and with the ones that are `added`.
+/// Computes the new sorted ids and sub-shapes: removes those of `changed` bodies and inserts those
+/// of `added` bodies.
 struct MergeProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kMerge;
   StepData data;
-  const std::uint32_t* changed = nullptr;  ///< slots whose body has come or gone
+  const std::uint32_t* changed = nullptr;  ///< slots whose body was added or removed
   std::uint32_t changed_count = 0;
   const BodyId* added_ids = nullptr;
   std::uint32_t added_id_count = 0;
@@ -76,7 +76,7 @@ struct MergeProgram {
   SubShapeView added;
   std::uint32_t part_count = 0, added_part_count = 0;  ///< sizes of SubShapeView::local
   SubShapeArrays to;
-  SubShapeRanges* kept = nullptr;  ///< receives the ranges of the sub-shapes that stay
+  SubShapeRanges* kept = nullptr;  ///< receives the ranges of the kept sub-shapes
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
@@ -118,7 +118,7 @@ struct MergeProgram {
     return data.marked[data.swept_bounds.sub_shapes.bodies[i]] == 0;
   }
 
-  /// The order of SubShapeTable, without that of the parts of a body.
+  /// Key of the order of SubShapeTable, without the order of parts of a body.
   JFPX_HD static std::uint64_t key(const SubShapeView& view, std::uint32_t i) {
     return std::uint64_t{view.ranges.range_of(i)} << 32 | view.bodies[i];
   }

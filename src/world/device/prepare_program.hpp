@@ -1,4 +1,4 @@
-/// Waking and rows of a soft step on a device.
+/// Waking of bodies and assignment of rows in a soft step on a device.
 #pragma once
 
 #include "src/base/atomic.hpp"
@@ -9,7 +9,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Wakes the islands that touch an awake body, starts the bodies, and assigns rows to contacts.
+/// Wakes islands that touch an awake body, initializes the bodies, and assigns rows to contacts.
 struct PrepareProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kPrepare;
   StepData data;
@@ -29,7 +29,7 @@ struct PrepareProgram {
   }
 
  private:
-  /// Starts the step and its first substep for a body.
+  /// Initializes a body for the step and its first substep.
   JFPX_HD void start(std::uint32_t i) const {
     const StepData& d = data;
     d.step.load(i);
@@ -68,7 +68,7 @@ struct PrepareProgram {
         });
   }
 
-  /// @returns whether there is room for the rows of manifolds and their points
+  /// @returns whether the rows of manifolds and their points fit into memory
   template <class Team>
   JFPX_HD bool place_points(const Team& team) const {
     const StepData& d = data;
@@ -92,7 +92,7 @@ struct PrepareProgram {
     return false;
   }
 
-  /// Sorts the rows without a color by kind, then by their contacts.
+  /// Sorts the overflow rows by kind, then by their contacts.
   template <class Team>
   JFPX_HD void sort_overflow(const Team& team) const {
     const StepData& d = data;
@@ -113,7 +113,7 @@ struct PrepareProgram {
     }
   }
 
-  /// Sorts the rows of a body with fixed bodies.
+  /// Sorts the rows between a movable body and fixed bodies.
   JFPX_HD void sort_fixed(std::uint32_t body) const {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();

@@ -1,4 +1,4 @@
-/// What only one step uses, in the memory of a device.
+/// Temporary device memory of one step.
 #pragma once
 
 #include "src/world/device/step_data.hpp"
@@ -13,7 +13,7 @@ namespace device {
 template <class Device>
 class ScratchBuffers {
  public:
-  /// Makes room for what is indexed by body. @param n number of slots
+  /// Reserves the arrays indexed by body. @param n number of slots
   void reserve_bodies(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
     d.motion = transfer.room(&motion_, n);
@@ -38,13 +38,13 @@ class ScratchBuffers {
     d.counters = transfer.room(&counters_, 1);
   }
 
-  /// Makes room for what is indexed by sub-shape. @param n number of sub-shapes that are no walls
+  /// Reserves the arrays indexed by sub-shape. @param n number of sub-shapes without walls
   void reserve_sub_shapes(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     data->swept_bounds.margins = transfer.room_to_grow(&margins_, n);
     data->swept_bounds.swept = transfer.room_to_grow(&swept_, n);
   }
 
-  /// Makes room for lists.
+  /// Reserves the lists.
   void reserve_lists(const Transfer<Device>& transfer, const Capacity& c, StepData* data) {
     StepData& d = *data;
     const std::size_t contacts = std::size_t{c.spheres} + c.candidates;

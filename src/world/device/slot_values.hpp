@@ -1,4 +1,4 @@
-/// All values of one body, for a device that gets a body between two steps.
+/// All values of one body, for adding a body on a device between two steps.
 #pragma once
 
 #include "src/world/bodies/body_view.hpp"
@@ -9,13 +9,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// The arrays of a BodyView that no step changes.
+/// Pointers to the columns of a BodyView that are constant in a step.
 struct PropertyPointers : PropertyColumns<PointerColumn>, InertiaColumns<PointerColumn> {};
 
 /// The values of a slot of the arrays of bodies.
 struct SlotValues {
   std::uint32_t body = 0;
-  bool has_no_contacts = false;  ///< with the body that had the slot in the last step
+  bool has_no_contacts = false;  ///< of the former body of the slot, in the last step
   MotionColumns<ValueColumn> motion;
   PropertyColumns<ValueColumn> properties;
   InertiaColumns<ValueColumn> inertia;
@@ -40,7 +40,7 @@ inline SlotValues slot_values(const BodyView& from, std::uint32_t i) {
   return values;
 }
 
-/// An unused slot: a body that neither moves nor has contacts.
+/// Values of an unused slot: a body without motion and contacts.
 inline SlotValues unused_slot(std::uint32_t i) {
   SlotValues unused;
   unused.body = i;

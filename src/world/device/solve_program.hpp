@@ -15,16 +15,16 @@ namespace device {
 /// Sweeps over all rows, as soft_step::SoftStepSolver, without barriers: a row waits only for the
 /// earlier rows of its two bodies (see Tickets), so that consecutive colors and sweeps overlap.
 /// After the rows of a sweep, each body solves its rows with fixed bodies and completes its part of
-/// the substep. Only the motion of bodies passes from thread to thread: Team::run_dataflow() gives
-/// a row to the same thread in all sweeps, and the other arrays by body are constant, or written by
-/// the thread of the body alone.
+/// the substep. Threads exchange only the motion of bodies: Team::run_dataflow() assigns a row to
+/// the same thread in all sweeps, and all other arrays by body are constant or written only by the
+/// thread of the body.
 ///
-/// The items of a thread are in the order of the sweeps, and an item waits only for items before
-/// it in this order. So the first item that is not complete never waits.
+/// There is no deadlock. The items of a thread have the order of the sweeps, and an item waits only
+/// for earlier items in this order, so the first incomplete item is always ready.
 struct SolveProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
-  /// Least number of items per thread from which a multiprocessor gets a second block. Waiting
-  /// threads poll memory, so a second block pays only where rows rarely wait.
+  /// Minimum number of items per thread for a second block per multiprocessor. Waiting threads poll
+  /// memory, so a second block pays only if rows rarely wait.
   static constexpr std::size_t kItemsPerThread = 32;
   StepData data;
 
@@ -62,8 +62,7 @@ struct SolveProgram {
  private:
   using SolverBody = soft_step::SolverBody;
 
-  /// Change that the impact of a row adds to the free motion of its bodies; see
-  /// soft_step::ImpactBodies.
+  /// Change of the free motion of both bodies by the impact of a row; see soft_step::ImpactBodies.
   struct Impact {
     const Vec3* acceleration = nullptr;
     std::uint32_t a = 0;  ///< body a of the row
@@ -87,7 +86,7 @@ struct SolveProgram {
     }
   };
 
-  /// A body of an item: the ticket that the item waits for, and the motion of the body at that
+  /// A body of an item: the ticket for which the item waits, and the motion of the body at that
   /// ticket.
   struct ItemBody {
     std::uint32_t index = 0;
@@ -120,8 +119,8 @@ struct SolveProgram {
     std::uint32_t first_fixed = kNone;  ///< of its rows with fixed bodies
   };
 
-  // Items are started in place, bodies a and b are treated without a loop, and run() is inlined:
-  // otherwise nvcc keeps items, 6.6 kB a thread in double, or the sweep in memory.
+  // Items are constructed in place, bodies a and b are handled without a loop, and run() is
+  // inlined. Otherwise nvcc spills items (6.6 kB per thread in double) or the sweep to memory.
 
   /// The rows of a sweep, for Team::run_dataflow().
   template <class Operation>
@@ -183,8 +182,7 @@ struct SolveProgram {
     team.run_dataflow(data.step.bodies.count, BodyDataflow<Operation>(*this, sweep, operation));
   }
 
-  /// The rows of the overflow are solved one after the other: by kind, then in the order of their
-  /// contacts.
+  /// Solves the overflow rows one after the other: by kind, then in the order of their contacts.
   template <class Operation>
   JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
     const std::uint32_t rows = sweep.overflow();
@@ -198,7 +196,7 @@ struct SolveProgram {
     }
   }
 
-  /// Starts a row without its tickets.
+  /// Initializes a row without its tickets.
   JFPX_HD void begin_row(const Sweep& sweep, std::uint32_t r, RowItem* item) const {
     const StepData& d = data;
     item->row = r;
@@ -308,7 +306,7 @@ struct SolveProgram {
     store<Operation>(sweep, row, item->row);
   }
 
-  /// Of a row that does not rebound in the sweeps.
+  /// For a row that does not rebound in the sweeps.
   template <class Row>
   JFPX_HD soft_step::RowContext<typename Row::Part, soft_step::ImpactBodies> context_of(
       const Row& row, const soft_step::BodyPair& pair) const {
@@ -373,13 +371,13 @@ struct SolveProgram {
     }
   }
 
-  /// The step has no effect if a body leaves the world.
+  /// Cancels the step if a body has left the world.
   JFPX_HD void check_state(std::uint32_t i) const {
     if (!is_in_world(data.step.state(i))) atomic_min(&data.counters->runaway, i);
   }
 
-  /// An immovable or kinematic body after a number of moves. A kinematic body does not wait for the
-  /// rows that read it: each of them computes its motion.
+  /// State of an immovable or kinematic body after a number of moves. Each row that reads a
+  /// kinematic body computes its motion, so no row waits for the body.
   JFPX_HD SolverBody fixed_body(std::uint32_t i, std::uint32_t moves) const {
     SolverBody body;
     body.velocity = data.step.solver[i].velocity;
@@ -392,7 +390,7 @@ struct SolveProgram {
     return body;
   }
 
-  /// Its orientation, likewise.
+  /// Orientation of an immovable or kinematic body after a number of moves.
   JFPX_HD Quat fixed_orientation(std::uint32_t i, std::uint32_t moves) const {
     const StepData& d = data;
     Quat orientation = d.step.bodies.orientation[i];
@@ -422,7 +420,7 @@ struct SolveProgram {
                                    BodyItem* item, BodyFree* free) const {
     soft_step::SphereRow row = data.sphere_rows.load(r);
     const Real restitution = row.restitution;
-    SolverBody fixed;  // not read: the body does not move
+    SolverBody fixed;  // not read: the body is constant
     const Impact impact{data.step.bodies.last_acceleration, row.a};
     const soft_step::BodyPair pair{&item->motion, &fixed, nullptr, nullptr};
     operation.template run<true>(
@@ -456,7 +454,7 @@ struct SolveProgram {
     store<Operation>(sweep, row, r);
   }
 
-  /// Writes what an operation has changed of a row. @param restitution before the operation
+  /// Stores the changes of a row by an operation. @param restitution before the operation
   template <class Operation>
   JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real restitution,
                      std::uint32_t r) const {

@@ -7,7 +7,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Resets the counters of the step before, without a barrier.
+/// Resets the counters of the last step, without a barrier.
 template <class Team>
 JFPX_HD void start_counters(const Team& team, const StepData& data) {
   team.once([&] {
@@ -16,7 +16,7 @@ JFPX_HD void start_counters(const Team& team, const StepData& data) {
   });
 }
 
-/// Saves what the step changes of a body before it can fail.
+/// Saves the columns of a body that the step changes before it can fail.
 JFPX_HD inline void save(const StepData& data, std::uint32_t body) {
   each_saved([body](auto* to, const auto* from) { to[body] = from[body]; }, data.saved,
              data.step.motion);

@@ -23,18 +23,18 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 
 using soft_step::kBins;
 
-/// Lists whose size is known only on the device. A step that needs more room than there is does not
-/// change the state of the world; the host reserves Counters::needed and repeats it.
+/// Capacities of lists whose size is known only on the device. A step that exceeds a capacity does
+/// not change the state of the world; the host reserves Counters::needed and repeats the step.
 struct Capacity {
   std::uint64_t pairs = 0;          ///< of swept bounds
   std::uint32_t spheres = 0;        ///< contacts of two spheres
   std::uint32_t candidates = 0;     ///< pairs of other sub-shapes, also the capacity of manifolds
   std::uint32_t points = 0;         ///< of manifolds
   std::uint32_t touches = 0;        ///< points of World::contacts(), except contacts of two spheres
-  std::uint32_t manifold_rows = 0;  ///< rows of manifolds, and of spheres that are none of spheres
+  std::uint32_t manifold_rows = 0;  ///< including contacts of spheres without SphereRow
   std::uint32_t row_points = 0;     ///< points of these rows
 
-  /// Grows what is less than needed, and some more. @param doubles whether by as much again
+  /// Grows capacities below `needed`, with slack. @param doubles reserves twice the need
   void grow(const Capacity& needed, bool doubles) {
     const auto grow_one = [doubles](auto* capacity, auto count) {
       if (count <= *capacity) return;
@@ -58,27 +58,28 @@ struct ContactSizes {
   std::uint32_t spheres = 0, manifolds = 0, points = 0, touches = 0;
 };
 
-/// What steps leave to later ones and to the host, which may have enqueued many of them. A step
-/// that cannot be completed, and all later ones, have no effect until the host repeats them.
+/// Progress of the steps, which later steps and the host read; the host may have enqueued many
+/// steps. A step that cannot be completed, and all later ones, have no effect until the host
+/// repeats them.
 struct Progress {
   std::uint64_t completed = 0;  ///< number of complete steps since the upload
   std::uint64_t deferred = 0;   ///< number of steps without effect since the last complete one
   std::uint64_t offset = 0;     ///< World::steps() minus `completed`
-  std::uint32_t started = 0;    ///< 1: SavedColumns are those of a step that is not complete
-  std::uint32_t held = 0;       ///< 1: the host has changes that the next step must see
-  ContactSizes contacts[2];     ///< of the last two steps, by the parity of `completed` before them
+  std::uint32_t started = 0;    ///< 1: SavedColumns belong to an incomplete step
+  std::uint32_t held = 0;       ///< 1: the host has changes that must precede the next step
+  ContactSizes contacts[2];     ///< of two steps, by the parity of `completed` before them
 };
 
-/// Numbers that the stages of a step pass to each other and to the host.
+/// Counters that the stages of a step exchange with each other and the host.
 struct StepCounters {
   std::uint32_t failed = 0;  ///< 1: a list has no room, or must_wake: the step has no effect
   std::uint32_t invalid_bounds = 0;  ///< 1: swept bounds are not finite, the step has no effect
   Capacity needed;
 
   std::uint32_t any_asleep = 0;     ///< 1: a movable body sleeps at the start of the step
-  std::uint32_t any_rebound = 0;    ///< 1: a manifold has a speed of separation
+  std::uint32_t any_rebound = 0;    ///< 1: a manifold has a rebound speed
   std::uint32_t any_rests = 0;      ///< 1: a body has been slow for long enough to sleep
-  std::uint32_t runaway = kNone;    ///< index of the first body that is_in_world() refuses
+  std::uint32_t runaway = kNone;    ///< index of the first body for which is_in_world() is false
   std::uint32_t uncolored[3] = {};  ///< number of contacts without a color, by round modulo 3
   std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows
 
@@ -88,8 +89,8 @@ struct StepCounters {
   std::uint32_t begun_points = 0;      ///< points of manifolds: soft_step::has_begun()
   std::uint32_t sphere_touches = 0;    ///< items of the list of touches of two spheres
   std::uint32_t awake = 0;             ///< movable bodies awake after the step
-  /// 1: a force must wake a body, the step has no effect. Without this number there would be
-  /// padding, which initcheck would report.
+  /// 1: a force must wake a body, the step has no effect. A full word, because padding would be
+  /// reported by initcheck.
   std::uint32_t must_wake = 0;
 };
 struct Counters : StepCounters {
@@ -103,8 +104,8 @@ struct NormalDistance {
   Real distance = 0;
 };
 
-/// A point of World::contacts() with its place in the order of that list. Those of two spheres that
-/// are bodies and no sensors are not in the list: they are in the contact set.
+/// A point of World::contacts() and its sort key. Contacts of two simple spheres that are no
+/// sensors are not in the list: they are in the contact set.
 struct Touch {
   Candidate pair;
   std::uint32_t number = 0;              ///< of the point in its pair
@@ -131,7 +132,7 @@ struct DeviceContacts {
 /// The joints on the device.
 struct DeviceJoints {
   const soft_step::JointInput* inputs = nullptr;
-  soft_step::KeptJoint* kept[2] = {};  ///< of the last two steps, as Progress::contacts
+  soft_step::KeptJoint* kept[2] = {};  ///< of the last two steps, indexed as Progress::contacts
   std::uint32_t count = 0;             ///< number of slots
 };
 
@@ -140,7 +141,7 @@ struct StepData {
   soft_step::StepBodies step;
   SweptBounds swept_bounds;
   FixedTreesView trees;
-  DeviceContacts contacts_of[2];  ///< as Progress::contacts
+  DeviceContacts contacts_of[2];  ///< indexed as Progress::contacts
   DeviceJoints world_joints;
   MaterialSettings materials;
   soft_step::StepConstants constants;
@@ -171,20 +172,20 @@ struct StepData {
   std::uint8_t* constrained = nullptr;  ///< by body: StepBodies::constrained
 
   std::uint16_t* row_bins = nullptr;     ///< by contact or joint, as RowSetup numbers them
-  std::uint32_t* row_contact = nullptr;  ///< by row of any kind: the same number
+  std::uint32_t* row_contact = nullptr;  ///< by row of any kind: index of its contact or joint
   StripedArray<soft_step::SphereRow> sphere_rows;
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
   soft_step::DistanceRow* distance_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
-  /// The rows without a free color: by kind, then in the order of contacts.
+  /// The overflow rows: by kind, then in the order of contacts.
   std::uint32_t* overflow = nullptr;
   MotionCells* motion_cells = nullptr;            ///< by body
   FreeCells* free_cells = nullptr;                ///< by body
   RowBody* row_bodies = nullptr;                  ///< by body
   OrientationCells* orientation_cells = nullptr;  ///< by body, of bodies with joints
-  SavedColumns<PointerColumn> saved;              ///< as they were at the start of the step
+  SavedColumns<PointerColumn> saved;              ///< values at the start of the step
 
   /// The rows of a kind other than spheres, by their number in this kind.
   template <class Row>
@@ -209,8 +210,8 @@ struct StepData {
   JFPX_HD BodyCells cells(std::uint32_t body) const {
     return {&motion_cells[body], &free_cells[body]};
   }
-  /// The contacts of the step in progress, and those of the last complete one. The device selects
-  /// them, because the host need not know how many steps are complete.
+  /// The contacts of the step in progress, and those of the last completed step. The device selects
+  /// them, because the host does not track the number of completed steps.
   JFPX_HD const DeviceContacts& now() const { return contacts_of[parity()]; }
   JFPX_HD const DeviceContacts& last() const { return contacts_of[1 - parity()]; }
   JFPX_HD soft_step::ContactView contacts() const {
@@ -253,12 +254,12 @@ struct StepData {
             step.solver,
             constants.restitution_threshold};
   }
-  /// Whether an earlier step was not completed, or the host must send changes first: the step has
-  /// no effect.
+  /// Whether the step has no effect, because an earlier step was not completed or changes of the
+  /// host are pending.
   JFPX_HD bool is_skipped() const {
     return counters->progress.deferred != 0 || counters->progress.held != 0;
   }
-  /// Whether an earlier stage has found that the step can't be completed.
+  /// Whether an earlier stage has failed, so that the step cannot be completed.
   JFPX_HD bool has_failed() const {
     return is_skipped() || counters->failed != 0 || counters->invalid_bounds != 0;
   }

@@ -1,4 +1,4 @@
-/// Steps of a World on a device that the host has not waited for.
+/// Enqueued steps of a World on a device for which the host has not waited.
 #pragma once
 
 #include <jfpx/world.hpp>
@@ -20,10 +20,10 @@ struct StepQueue {
   };
   /// Const functions of the world read it concurrently.
   std::atomic<State> state{State::empty};
-  std::uint64_t deferred_steps = 0;  ///< steps of the queue that the host must make
-  std::string failure;               ///< why the device cannot make them; empty: no failure
+  std::uint64_t deferred_steps = 0;  ///< steps of the queue that the host must perform
+  std::string failure;               ///< why the device cannot perform them; empty: no failure
   StepReport report;                 ///< of the last step of a queue
-  std::recursive_mutex finishing;    ///< held by finish_queue(), whose steps call finish() again
+  std::recursive_mutex finishing;    ///< held by finish_queue(), whose steps call finish()
 };
 
 }  // namespace JFPX_ABI

@@ -12,8 +12,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// The items are stored by their pieces of 16 bytes: first the first pieces of all items, then the
-/// second ones. So consecutive threads that read consecutive items access consecutive addresses.
+/// Stores items in pieces of 16 bytes: the first pieces of all items, then all second pieces, and
+/// so on. Consecutive threads that read consecutive items thus access consecutive addresses.
 /// @tparam T trivially copyable, a multiple of 16 bytes
 template <class T>
 class StripedArray {

@@ -32,7 +32,7 @@ class SubShapeBuffers {
     transfer.put(&local_, from.local, part_count, part_room_);
   }
 
-  /// Makes room for the sub-shapes of two objects. complete() must follow.
+  /// Reserves memory for the sub-shapes of both objects. complete() must follow.
   SubShapeArrays reserve(const Transfer<Device>& transfer, const SubShapeBuffers& a,
                          const SubShapeBuffers& b) {
     const SubShapeRanges most = a.ranges_ + b.ranges_;
@@ -62,7 +62,7 @@ class SubShapeBuffers {
   }
   const SubShapeRanges& ranges() const { return ranges_; }
   std::uint32_t part_count() const { return part_count_; }
-  /// Whether so few parts were added and removed since upload() that no new upload() is due.
+  /// Whether added and removed parts still fit into the memory reserved by upload().
   bool has_room() const { return part_count_ <= part_room_; }
 
  private:
@@ -75,7 +75,7 @@ class SubShapeBuffers {
   Buffer<Wall> walls_;
   Buffer<Transform> local_;
   SubShapeRanges ranges_;
-  std::uint32_t part_count_ = 0;  ///< size of local_, with parts of compounds that were removed
+  std::uint32_t part_count_ = 0;  ///< size of local_, including parts of removed compounds
   std::size_t part_room_ = 0;
 };
 

@@ -11,7 +11,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Rows of a warp, which are of one bin.
+/// Rows per warp; all have the same bin.
 inline constexpr std::uint32_t kWarpItems = 32;
 
 /// Work on a body after the rows of a sweep.
@@ -27,7 +27,7 @@ struct Sweep {
   std::uint32_t colored_items = 0;  ///< number of items for all rows that have a color
   std::uint32_t number = 0;
   BodyStage stage = BodyStage::none;
-  bool stores_impulses = false;  ///< whether the impulses of rows are those of the step
+  bool stores_impulses = false;  ///< whether this sweep stores the final impulses of the rows
 
   JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
@@ -50,8 +50,7 @@ struct Sweep {
     return begin[soft_step::bin_of(soft_step::kKindOf<Row>, 0)];
   }
   JFPX_HD std::uint32_t size(std::uint32_t bin) const { return begin[bin + 1] - begin[bin]; }
-  /// Number of items for the rows of a bin: a warp has rows of one bin only, none of which waits
-  /// for another.
+  /// Number of items for the rows of a bin. A warp has rows of one bin only, which are independent.
   JFPX_HD std::uint32_t items(std::uint32_t bin) const {
     return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
   }
@@ -63,18 +62,18 @@ struct Sweep {
     }
     return rows;
   }
-  /// Number of moves that a kinematic body has made when the rows of the sweep are solved.
+  /// Number of moves of a kinematic body before the rows of the sweep are solved.
   JFPX_HD std::uint32_t moves() const {
     return (number + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
   }
 };
 
-/// Finds the rows of the colors, in the order of a sweep: by color, then by kind.
+/// Iterates over the rows of the colors in sweep order: by color, then by kind.
 class RowCursor {
  public:
   JFPX_HD explicit RowCursor(const Sweep& sweep) : sweep_(sweep) {}
 
-  /// Moves to an item; the search restarts if it precedes that of the last call.
+  /// Advances to an item; restarts the search if the item precedes that of the last call.
   /// @returns the row, or kNone
   JFPX_HD std::uint32_t find(std::uint32_t item) {
     if (item < before_) {

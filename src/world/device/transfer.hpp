@@ -10,8 +10,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Copies between the host and the buffers of a device. The functions only enqueue work: what they
-/// read or write on the host must stay until wait() returns. Counts the buffers that it moves.
+/// Copies between the host and the buffers of a device. The functions only enqueue work: host
+/// memory must stay valid until wait() returns. Counts reallocations.
 /// @tparam Device as for DeviceStep
 template <class Device>
 class Transfer {
@@ -41,7 +41,7 @@ class Transfer {
   void get(std::vector<T>* to, const Buffer<T>& from) const {
     device_->download(to->data(), from.data(), to->size());
   }
-  /// Makes room for `count` items, which discards the contents. @returns the address
+  /// Reserves `count` items and discards the contents. @returns the address
   template <class T>
   T* room(Buffer<T>* buffer, std::size_t count) const {
     note_move(buffer, [&] {
@@ -49,7 +49,7 @@ class Transfer {
     });
     return buffer->data();
   }
-  /// The same for a count that may grow by little from call to call.
+  /// reserve() for a count that may grow slightly from call to call.
   template <class T>
   T* room_to_grow(Buffer<T>* buffer, std::size_t count) const {
     note_move(buffer, [&] {
@@ -62,11 +62,11 @@ class Transfer {
     device_->copy(to, from, count);
   }
   void wait() const { device_->wait(); }
-  /// Changes whenever an array gets another address.
+  /// Version number that changes whenever an array is reallocated.
   std::uint64_t moves() const { return moves_; }
 
  private:
-  /// Counts the move of a buffer, if reserve() moves it.
+  /// Calls reserve() and counts a reallocation.
   template <class T, class Reserve>
   void note_move(Buffer<T>* buffer, const Reserve& reserve) const {
     const T* const before = buffer->data();

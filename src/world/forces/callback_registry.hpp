@@ -18,8 +18,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Calls the callbacks in the order of their addition, which is that of the ids: floating-point
-/// sums depend on the order, and so does the choice among equal contacts.
+/// Calls the callbacks in the order of their addition, which is the order of the ids. The order
+/// affects floating-point sums and the choice among equal contacts.
 template <class Context, class Id>
 class CallbackRegistry {
  public:
@@ -51,7 +51,8 @@ class CallbackRegistry {
   bool empty() const noexcept { return ids_.empty(); }
   /// The number of the next id.
   std::uint64_t next() const noexcept { return next_; }
-  /// Replaces ids and callbacks. Null: the callback that has the id now; its address remains.
+  /// Replaces ids and callbacks. A null callback keeps the current one with that id and its
+  /// address.
   /// @param ids ascending and below `next`
   void replace(std::vector<Id> ids, std::vector<std::unique_ptr<Function>> functions,
                std::uint64_t next) noexcept {

@@ -47,7 +47,7 @@ JFPX_HD void act_on_surface(const Mat3& tensor, const Vec3& point, const Vec3& w
   body->apply_at(axes * (tensor * airspeed), surface.position);
 }
 
-// Each applies a force to an awake body. Springs are not among them: they have two ends.
+// Each function applies a force to an awake body. Springs, which have two ends, are separate.
 template <class Body>
 JFPX_HD void act_on(const Gravity& force, Body* body) {
   body->apply(force.acceleration * body->mass());
@@ -84,7 +84,7 @@ JFPX_HD void act_on(const Buoyancy& force, Body* body) {
     });
   });
 }
-/// Also for a body that sleeps.
+/// Also acts on sleeping bodies.
 /// @param time [s], start of the step
 template <class Body>
 JFPX_HD void act_on(const Explosion& force, double time, Body* body) {

@@ -13,7 +13,7 @@ namespace {
 
 using Ends = std::array<std::optional<BodyId>, 2>;
 
-/// The bodies that a force names.
+/// The bodies to which a force refers.
 template <class F>
 Ends ends_of(const F& force) {
   return {force.body, std::nullopt};
@@ -24,7 +24,7 @@ Ends ends_of(const F& spring) {
 }
 Ends ends_of(const Explosion&) { return {}; }
 
-/// Whether two forces have the same bytes. Padding may differ; then they only seem to differ.
+/// Whether two forces have the same bytes. Different padding yields a false negative.
 template <class F>
 bool are_same(const F& a, const F& b) {
   static_assert(std::is_trivially_copyable_v<F>);
@@ -39,7 +39,7 @@ bool ForceTable::update(const ForceRegistry& forces, const BodyStore& bodies) {
     all_known_ = find_sources(forces);
     if (all_known_) copy_bodies(bodies);
   }
-  is_current_ = false;  // if memory runs out
+  is_current_ = false;  // remains false if an allocation fails
   if (all_known_) make_lists(bodies);
   is_current_ = true;
   return all_known_;
@@ -56,7 +56,7 @@ bool ForceTable::add_source(const ForceRegistry::Function& function, Kind<F>* ki
   return true;
 }
 
-/// @returns whether all forces are of force.hpp
+/// @returns whether all forces are types of force.hpp
 bool ForceTable::find_sources(const ForceRegistry& forces) {
   ++parameters_version_;
   count_ = 0;
@@ -69,7 +69,7 @@ bool ForceTable::find_sources(const ForceRegistry& forces) {
       kinds_);
 }
 
-/// Copies the parameters that have changed. @param names_changed becomes true if bodies have
+/// Copies changed parameters. @param names_changed set to true if a force refers to other bodies
 template <class F>
 void ForceTable::read(Kind<F>* kind, bool* names_changed) {
   for (std::size_t i = 0; i < kind->sources.size(); ++i) {
@@ -81,14 +81,14 @@ void ForceTable::read(Kind<F>* kind, bool* names_changed) {
     ++parameters_version_;
   }
 }
-/// @returns whether a force names other bodies
+/// @returns whether a force refers to other bodies than before
 bool ForceTable::read_values() {
   bool names_changed = false;
   std::apply([&](auto&... kind) { (read(&kind, &names_changed), ...); }, kinds_);
   return names_changed;
 }
 
-/// A force that names a removed body is in no list.
+/// A force that refers to a removed body is in no list.
 template <class F>
 void ForceTable::list(const BodyStore& bodies, std::uint32_t kind_number, const Kind<F>& kind) {
   for (std::uint32_t number = 0; number < kind.values.size(); ++number) {
@@ -126,7 +126,7 @@ void ForceTable::make_lists(const BodyStore& bodies) {
   first_item_.resize(bodies.capacity() + 1, static_cast<std::uint32_t>(on_body_.size()));
 }
 
-/// Copies the properties of bodies that only some kinds of forces need.
+/// Copies the properties of bodies that the present kinds of forces need.
 void ForceTable::copy_bodies(const BodyStore& bodies) {
   const std::size_t capacity = bodies.capacity();
   mass_.assign(std::get<Kind<Gravity>>(kinds_).values.empty() ? 0 : capacity, 0);

@@ -14,16 +14,16 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Copies of the forces of force.hpp, and the list of those on each body. A step compares the
-/// copies with the forces, because World::force() lets users change these at any time; it makes the
-/// lists only if they have changed.
+/// Copies of the forces of force.hpp, and a list of the forces on each body. Each step compares the
+/// copies with the forces, because users can change forces at any time by World::force(). The lists
+/// are rebuilt only after a change.
 class ForceTable {
  public:
   /// Must be called after forces or bodies were added, removed or replaced, and after changes of
   /// masses.
   void invalidate() noexcept { is_current_ = false; }
   /// Updates the table.
-  /// @returns false if a force is not one of force.hpp; the table must not be used then
+  /// @returns false if a force is not a type of force.hpp; the table is then invalid
   /// @throws std::bad_alloc
   bool update(const ForceRegistry& forces, const BodyStore& bodies);
 
@@ -44,7 +44,7 @@ class ForceTable {
   };
   template <class... F>
   static std::tuple<Kind<F>...> kinds_of(const std::variant<F...>&);
-  /// A force that names a body.
+  /// A force that refers to a body.
   struct Named {
     std::uint32_t body = 0;
     ForceItem item;
@@ -62,7 +62,7 @@ class ForceTable {
   void copy_bodies(const BodyStore& bodies);
 
   bool is_current_ = false;
-  bool all_known_ = false;  ///< whether all forces are of force.hpp
+  bool all_known_ = false;  ///< whether all forces are types of force.hpp
   std::uint32_t count_ = 0;
   decltype(kinds_of(std::declval<RecordableForce>())) kinds_;
   std::vector<Named> named_;  ///< during make_lists()

@@ -12,7 +12,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// A force in the list of a body, or in that of all bodies. A spring is in the lists of both ends.
+/// A force in the list of a body or in the list of all bodies. A spring is in the lists of both
+/// ends.
 struct ForceItem {
   static constexpr std::uint32_t kNoBody = 0xffffffffu;
 
@@ -49,11 +50,11 @@ struct ForceArrays<std::variant<Kinds...>> : ForceArray<Kinds>... {
 
 struct ForceView : ForceArrays<RecordableForce> {
   const ForceItem* on_all = nullptr;          ///< forces on all bodies
-  const ForceItem* on_body = nullptr;         ///< forces that name a body, by body
-  const std::uint32_t* first_item = nullptr;  ///< by body, and one more: index in `on_body`
+  const ForceItem* on_body = nullptr;         ///< forces that refer to a body, by body
+  const std::uint32_t* first_item = nullptr;  ///< by body, one additional entry: index in `on_body`
   const Real* mass = nullptr;                 ///< [kg], by body; empty without Gravity
   const SolidPart* parts = nullptr;           ///< by body
-  const std::uint32_t* first_part = nullptr;  ///< by body, and one more; empty without Buoyancy
+  const std::uint32_t* first_part = nullptr;  ///< by body, one more entry; empty without Buoyancy
   std::uint32_t on_all_count = 0, on_body_count = 0, first_item_count = 0, mass_count = 0,
                 part_count = 0, first_part_count = 0;
 

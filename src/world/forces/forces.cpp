@@ -18,7 +18,7 @@ namespace {
   throw InvalidArgument(std::string(force) + ": " + fault);
 }
 
-/// Checks that the bodies of a force, or of a part of it, are alive.
+/// Checks that the bodies of a force, or of a part of a force, exist.
 /// @param path of the object in the force, with a dot at its end
 template <class T>
 void require_alive(const char* force, const ForceContext& context, const T& object,
@@ -72,7 +72,7 @@ class ContextBody {
   BodyId id_;
 };
 
-/// Applies a force to its body if that lives and is awake, or to all awake bodies.
+/// Applies a force to its body if the body exists and is awake, or to all awake bodies.
 template <class F>
 void act_on_awake(const F& force, const std::optional<BodyId>& body, ForceContext* context) {
   const auto act = [&](BodyId id) {

@@ -95,7 +95,7 @@ void JointStore::remove(std::uint32_t joint) noexcept {
 void JointStore::set(std::uint32_t joint, const Joint& value) noexcept { put(joint, value); }
 
 bool JointStore::excludes_contacts(std::uint32_t a, std::uint32_t b) const noexcept {
-  // In step through the joints of both, so that the shorter list decides the time.
+  // Traverses the joints of both bodies together, so that the shorter list determines the time.
   auto of_a = of_body_.lower_bound({a, 0}), of_b = of_body_.lower_bound({b, 0});
   const auto is_at = [this](auto at, std::uint32_t body) {
     return at != of_body_.end() && at->first == body;

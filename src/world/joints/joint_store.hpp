@@ -18,7 +18,7 @@ inline namespace JFPX_ABI {
 /// The bodies of a joint, by their indices; b may be soft_step::kWorld.
 struct JoinedBodies {
   std::uint32_t a = 0, b = soft_step::kWorld;
-  /// Whether the joint is of two bodies that must not collide with each other.
+  /// Whether the joint connects two bodies that must not collide with each other.
   bool excludes_contacts = false;
 };
 JoinedBodies joined_bodies(const Joint& joint) noexcept;
@@ -26,7 +26,7 @@ JoinedBodies joined_bodies(const Joint& joint) noexcept;
 /// Impulse that pulls the bodies together in the last substep [N s].
 Real pull_of(const DistanceJoint& joint, const soft_step::KeptJoint& kept) noexcept;
 
-/// Owns the joints, their ids, and what they keep from step to step.
+/// Owns the joints, their ids, and their impulses and colors for warm starting.
 class JointStore {
  public:
   bool empty() const noexcept { return pool_.size() == 0; }
@@ -45,7 +45,7 @@ class JointStore {
   /// @throws std::bad_alloc; the store is then unchanged
   JointId add(const Joint& joint);
   void remove(std::uint32_t joint) noexcept;
-  /// Replaces a joint by one of the same type and bodies, which keeps the impulses.
+  /// Replaces a joint by one of the same type and bodies; keeps the impulses.
   void set(std::uint32_t joint, const Joint& value) noexcept;
   /// Calls f(joint) for all joints of a body.
   template <class F>
@@ -59,12 +59,12 @@ class JointStore {
 
   /// The joints of the next step. Valid until a joint is added or removed.
   soft_step::JointView view();
-  /// Completes the step: what the joints keep now becomes what they kept in the last step.
+  /// Completes the step: the impulses of this step become those of the last step.
   void commit() noexcept { last_.swap(now_); }
-  /// Replaces what the joints keep, by slot.
+  /// Impulses and colors of the last step, by slot.
   std::vector<soft_step::KeptJoint>& last() noexcept { return last_; }
 
-  /// Replaces all joints and ids, as IdPool::assign(); restore() adds the joints.
+  /// Replaces all joints and ids, like IdPool::assign(); restore() adds the joints.
   void assign(const std::vector<std::uint32_t>& generations,
               const std::vector<std::uint32_t>& unused);
   void restore(std::uint32_t slot, const Joint& joint, const soft_step::KeptJoint& kept);

@@ -15,8 +15,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Selects the bodies that a query may find; the query then applies its exact test to them. A node
-/// is a block of a BlockTree.
+/// Selects candidate bodies for the exact test of a query. A node is a block of a BlockTree.
 ///
 /// Queries are conservative: they visit every body that the exact test in world_queries.cpp finds,
 /// including its rounding errors. Let u be half of kEpsilon, and let D be the largest coordinate
@@ -34,15 +33,15 @@ inline namespace JFPX_ABI {
 ///     of the half diagonals. Their distance is at most sqrt(3) times that gap, which gives
 ///     6 sqrt(epsilon) (D + R). The margin is at least 22 sqrt(epsilon) (D + R).
 ///   - kLostLength exceeds all lengths that are lost because their squares are denormal.
-/// The D of a node is at least that of its children, and so is the margin.
+/// D of a node, and therefore its margin, is at least that of its children.
 class QueryTree {
  public:
   /// Replaces the contents by all bodies, in O(n) time. Memory is kept for the next call.
   /// @throws std::bad_alloc, OutOfMemory; the tree may then only be destroyed or built again
   void build(const BodyStore& bodies);
 
-  /// Calls limit = visit(body) for the walls, and then for each body that the ray may hit at a
-  /// distance of at most the current limit [m], which is ray.max_distance at first.
+  /// Calls limit = visit(body) for the walls, then for each body that the ray may hit at a distance
+  /// of at most the current limit [m]. The initial limit is ray.max_distance.
   /// @param ray with a direction of length 1
   template <class Visit>
   void visit_along(const Ray& ray, const Visit& visit) const {
@@ -170,7 +169,7 @@ class QueryTree {
   }
 
   std::vector<std::uint32_t> walls_;  ///< bodies without bounds
-  BlockTree tree_;                    ///< of the others
+  BlockTree tree_;                    ///< of all other bodies
   // During build(): the bodies of the tree.
   std::vector<std::uint32_t> bodies_;
   std::vector<Aabb> bounds_;

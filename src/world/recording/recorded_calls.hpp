@@ -37,7 +37,7 @@ template <class... Arguments>
 Json make_call(const char* name, const Arguments&... arguments) {
   return Json::array({name, argument(arguments)...});
 }
-/// Makes a call on a world.
+/// Performs a call on a world.
 /// @throws nlohmann::json::exception or InvalidScene for a value that is not a call, and the
 ///   exceptions of the function of World
 void make_call_on(World& world, const Json& call);

@@ -20,8 +20,8 @@ struct RecordedWorld::Impl {
                 .scene = scene},
                true) {}
 
-  /// Calls a function and adds the call to those of the next step. The call is added first, because
-  /// that may fail, and taken back if the function fails.
+  /// Calls a function and records the call for the next step. The call is recorded first, because
+  /// recording may fail, and removed if the function fails.
   template <class Function, class... Arguments>
   decltype(auto) call(const char* name, Function function, const Arguments&... arguments) {
     calls.push_back(recorded::make_call(name, arguments...));

@@ -32,7 +32,7 @@ constexpr std::uint32_t kVersion = 1, kVersionWithCalls = 2;
 constexpr std::size_t kRealsPerBody = 13;
 constexpr std::size_t kPrefixSize = 24;
 constexpr std::size_t kTrailerSize = 24;
-/// Frames without bodies are empty, so a file of any size could claim any number of them.
+/// Frames without bodies are empty, so the file size does not limit the claimed number of frames.
 constexpr std::uint64_t kMaxEmptyFrames = 10'000'000;
 
 static_assert(sizeof(BodyState) == kRealsPerBody * sizeof(Real), "a state has no padding");

@@ -1,7 +1,7 @@
 /// The bodies of a world in a snapshot: BodyStore::write() and read().
 ///
-/// Values that BodyStore computes from others are computed again, with the same bits. The inertia
-/// in world axes is an exception: that of a sphere does not follow every rotation.
+/// Derived values are recomputed with the same bits. The inertia in world axes is stored, because
+/// that of a sphere is not updated by every rotation.
 #include "src/scene/scene_validate.hpp"
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/snapshots/snapshot_checks.hpp"
@@ -22,8 +22,8 @@ constexpr std::size_t kLeastBodySize = 32 * sizeof(Real);
 constinit const BodyDef kAnyBody{};
 constexpr const char* kNoFlag = "a flag of a body is neither 0 nor 1";
 
-/// Validation tolerates normals that are not quite of unit length, whose offset BodyStore::add()
-/// scales with them: by that much, it may exceed kMaxCoordinate.
+/// Validation tolerates normals of slightly different length. BodyStore::add() normalizes them and
+/// scales the offset by the same factor, so the offset may exceed kMaxCoordinate by that factor.
 template <class Wall>
 void check_wall(Wall* wall) {
   constexpr Real kMost = kMaxCoordinate * (1 + kUnitTolerance);
@@ -33,7 +33,7 @@ void check_wall(Wall* wall) {
 
 }  // namespace
 
-/// All that a body consists of, in the order of the bytes. `Self` is const for a writer.
+/// All members of a body in the order of the bytes. `Self` is const for a writer.
 template <class Archive, class Self>
 void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
   const auto inertia = [&](auto& given) {
@@ -102,7 +102,7 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
   }
 }
 
-/// The body as add() gets it.
+/// The body in the form that add() accepts.
 BodyDef BodyStore::definition(std::uint32_t i) const {
   BodyDef def;
   const auto get = [i](const auto& column, auto& value) {
@@ -116,7 +116,7 @@ BodyDef BodyStore::definition(std::uint32_t i) const {
   return def;
 }
 
-/// Checks a body as add() and set_state() do, and the further conditions that the engine relies on.
+/// Checks a body like add() and set_state(), and the further invariants of the engine.
 void BodyStore::check_body(std::uint32_t i) const {
   BodyDef def = definition(i);
   if (auto* half_space = std::get_if<HalfSpace>(&def.shape)) check_wall(half_space);

@@ -27,8 +27,7 @@ using soft_step::KeptImpulse;
 using soft_step::ManifoldInput;
 using soft_step::PointInput;
 
-/// Checks that a list of contacts is one that a step can have made, as far as the next step relies
-/// on it.
+/// Checks the invariants of contact lists on which the next step depends.
 class Checker {
  public:
   Checker(const BodyStore& bodies, SnapshotColors* colors) : bodies_(bodies), colors_(*colors) {}
@@ -111,7 +110,7 @@ void write_contacts(BinaryWriter* writer, const ContactSet& set) {
     const std::size_t contact = set.spheres.size() + m;
     write(manifold.key, set.rolling_impulse(contact), set.colors[contact], manifold.normal);
     write(std::uint64_t{manifold.count});
-    // Points and impulses of contacts that ContactCache::forget() has removed are left out.
+    // Skips points and impulses of contacts that ContactCache::forget() has removed.
     for (std::uint32_t p = manifold.first; p < manifold.first + manifold.count; ++p) {
       const PointInput& point = set.points[p];
       write(point.arm_a, point.feature, set.impulses[set.spheres.size() + p]);

@@ -9,7 +9,7 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Writes what ContactCache::match() reads of the contacts of a completed step.
+/// Writes the members of the contacts of a completed step that ContactCache::match() reads.
 void write_contacts(BinaryWriter* writer, const soft_step::ContactSet& contacts);
 /// Reads contacts of the bodies; all other members of the contacts are zero.
 /// @param colors receives the colors of the contacts

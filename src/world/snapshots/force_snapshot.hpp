@@ -19,14 +19,14 @@ inline namespace JFPX_ABI {
 void write_forces(BinaryWriter* writer, const ForceRegistry& forces);
 void write_generators(BinaryWriter* writer, const GeneratorRegistry& generators);
 
-/// The forces of a snapshot: the ids of all, and the values of those of force.hpp. User-defined
-/// forces cannot be written; the world must have them.
+/// The forces of a snapshot: all ids, and the values of the types of force.hpp. User-defined forces
+/// cannot be written and must exist in the world.
 class ForceRestorer {
  public:
   /// Reads forces and prepares their restoration in `forces`.
-  /// @throws InvalidSnapshot if `forces` has not the same user-defined forces; std::bad_alloc
+  /// @throws InvalidSnapshot if `forces` has other user-defined forces; std::bad_alloc
   ForceRestorer(BinaryReader* reader, const ForceRegistry& forces);
-  /// Replaces all forces. Those with the id and type of a former one have its address.
+  /// Replaces all forces. Forces that keep id and type also keep their address.
   // NOLINTNEXTLINE(bugprone-exception-escape): std::visit throws for valueless variants only
   void commit(ForceRegistry* forces) noexcept;
 
@@ -41,13 +41,13 @@ class ForceRestorer {
   std::uint64_t next_;
   std::vector<ForceId> ids_;
   std::vector<Value> values_;
-  std::vector<std::unique_ptr<ForceRegistry::Function>> created_;  ///< null: the world has it
+  std::vector<std::unique_ptr<ForceRegistry::Function>> created_;  ///< null: kept
 };
 
 /// The contact generators of a snapshot, all of which are user-defined.
 class GeneratorRestorer {
  public:
-  /// @throws InvalidSnapshot if `generators` has not the same generators
+  /// @throws InvalidSnapshot if `generators` has other generators
   GeneratorRestorer(BinaryReader* reader, const GeneratorRegistry& generators);
   void commit(GeneratorRegistry* generators) noexcept;
 

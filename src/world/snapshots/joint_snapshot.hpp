@@ -9,10 +9,10 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Writes the joints, their ids, and what they keep.
+/// Writes the joints, their ids, impulses and colors.
 void write_joints(BinaryWriter* writer, const JointStore& joints);
 /// Reads joints of the bodies, and sets the pairs of bodies that do not collide because of them.
-/// @param colors of the contacts, to which those of the joints are added
+/// @param colors of the contacts; receives the colors of the joints
 /// @throws InvalidSnapshot, std::bad_alloc
 JointStore read_joints(BinaryReader* reader, SnapshotColors* colors, BodyStore* bodies);
 

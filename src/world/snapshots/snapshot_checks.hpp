@@ -1,4 +1,4 @@
-/// Checks that the parts of a snapshot share.
+/// Checks shared by the parts of a snapshot.
 #pragma once
 
 #include "src/base/binary_archive.hpp"
@@ -29,13 +29,13 @@ struct SnapshotSlots {
   }
 };
 
-/// The colors of the contacts and joints in a snapshot: two of a body must differ.
+/// The colors of the contacts and joints in a snapshot. Colors of the same body must differ.
 class SnapshotColors {
  public:
   /// Messages of the errors.
   struct Messages {
     const char* immovable;  ///< a contact or joint with an immovable body has a color
-    const char* same;       ///< two of a body have the same color
+    const char* same;       ///< two contacts or joints of a body have the same color
   };
 
   explicit SnapshotColors(std::size_t bodies) : used_(bodies) {}

@@ -1,5 +1,5 @@
-/// The bytes of the types that a snapshot consists of. Each function names all members of its type,
-/// so that a new member does not compile until it is here or in a list of fields (field.hpp).
+/// Serialization of the types of a snapshot. Each function names all members of its type, so that a
+/// new member is a compile error until it is added here or in a list of fields (field.hpp).
 #pragma once
 
 #include <jfpx/force.hpp>

@@ -12,7 +12,7 @@ inline namespace JFPX_ABI {
 void start_snapshot(BinaryWriter* writer);
 /// Completes the header and adds the checksum.
 /// @param writer has written header and content
-/// @param has_joints whether the content has the part that version 2 adds
+/// @param has_joints whether the content has the joints of version 2
 Snapshot finish_snapshot(BinaryWriter* writer, bool has_joints);
 /// A reader of the content. @throws InvalidSnapshot if header or checksum are not valid
 BinaryReader open_snapshot(const Snapshot& snapshot);

@@ -15,7 +15,7 @@ namespace soft_step {
 /// unions. Concurrent unions link the higher of two roots to the lower one (after Jayanti and
 /// Tarjan 2016).
 struct DisjointSets {
-  std::uint32_t* parent = nullptr;  ///< by body: a body of the same set, not a higher one
+  std::uint32_t* parent = nullptr;  ///< by body: a body of the same set, index not higher
 
   /// Label of the set of a body, once all unions are complete.
   JFPX_HD std::uint32_t find(std::uint32_t body) const {
@@ -23,7 +23,7 @@ struct DisjointSets {
       const std::uint32_t above = load_shared(&parent[body]);
       if (above == body) return body;
       const std::uint32_t next = load_shared(&parent[above]);
-      // Path halving. If another thread has changed the parent, this change is not needed.
+      // Path halving. A failed exchange is harmless: another thread has changed the parent.
       if (next != above) atomic_exchange_if(&parent[body], above, next);
       body = next;
     }
@@ -39,8 +39,8 @@ struct DisjointSets {
   }
 };
 
-/// Wakes islands, and puts them to sleep. The functions are called by all threads of a team:
-/// PoolTeam, or that of a device.
+/// Wakes islands and puts them to sleep. All threads of a team call the functions: a PoolTeam or
+/// the team of a device.
 struct Islands {
   const StepBodies& step;
   ContactView contacts;
@@ -48,7 +48,7 @@ struct Islands {
   DisjointSets sets;
   std::uint8_t* marked = nullptr;         ///< by label of an island
   bool any_carriers = true;               ///< whether `step` may have kinematic bodies in motion
-  const std::uint32_t* mobile = nullptr;  ///< bodies that are not immovable, or null: all of `step`
+  const std::uint32_t* mobile = nullptr;  ///< bodies that are not immovable; null: all of `step`
   std::uint32_t mobile_count = 0;
 
   /// Wakes the islands that touch an awake body or a kinematic body in motion.
@@ -70,7 +70,7 @@ struct Islands {
     });
   }
 
-  /// Puts the islands to sleep whose bodies have all been slow for long enough.
+  /// Puts islands to sleep if all their bodies have been slow for long enough.
   template <class Team>
   JFPX_HD void put_to_sleep(const Team& team) const {
     const BodyView& bodies = step.bodies;
@@ -98,9 +98,9 @@ struct Islands {
     }
   }
 
-  /// Unites the movable bodies of joints, and of the contacts for which touches(contact) holds, and
-  /// marks the islands that touch, or are joined with, a kinematic body in motion: a sleeping body
-  /// has no velocity and could not be carried by it.
+  /// Unites the movable bodies of joints, and of contacts for which touches(contact) is true. Marks
+  /// the islands that touch, or are joined with, a kinematic body in motion, which would not carry
+  /// a sleeping body.
   template <class Team, class Touches>
   JFPX_HD void find(const Team& team, const Touches& touches) const {
     const BodyView& bodies = step.bodies;

@@ -2,9 +2,10 @@
 /// Simulation, 2019).
 ///
 /// Box2D applies the accumulated impulse of every contact at the start of each substep. Here this
-/// is done per body: FreeMotion has its velocities right after its accelerations, so its velocity
-/// minus these is what the contacts of the substep have changed, and accelerate() adds it again.
-/// This is the same, because normals and anchors are constant within a step.
+/// is done per body. FreeMotion stores the velocities of the body after its accelerations. The
+/// difference to its current velocity is the sum of the contact impulses of the substep;
+/// accelerate() applies it again. The results agree, because normals and anchors are constant
+/// within a step.
 #include "src/world/step/soft_step.hpp"
 
 #include "src/base/parallel_for.hpp"
@@ -44,7 +45,7 @@ void SoftStep::restore(const SoftStepSettings& settings, const MaterialSettings&
   cache_.restore(std::move(last));
 }
 
-/// Generated contacts of the same bodies are identified by their sequence.
+/// Generated contacts of the same bodies are identified by their sequence number.
 void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> generated) {
   if (generated.empty()) return;
   ContactSet& set = cache_.current();
@@ -58,7 +59,7 @@ void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> g
     set.manifolds.push_back({key, c.normal, point, 1, c.friction, c.restitution});
   }
   std::ranges::sort(set.manifolds, by_key);
-  // Numbered for each pair of bodies, so that a contact that comes or goes renames no other pair's.
+  // Numbered per pair of bodies, so that a new or missing contact does not renumber other pairs.
   const ContactKey* before = nullptr;
   for (soft_step::ManifoldInput& manifold : set.manifolds) {
     ContactKey& key = manifold.key;
@@ -92,7 +93,7 @@ soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
           .mobile_count = static_cast<std::uint32_t>(mobile.size())};
 }
 
-/// Marks the bodies that have a contact in this step, or a joint.
+/// Marks the bodies with a contact or joint in this step.
 void SoftStep::mark_constrained() {
   assign_geometric(&constrained_, bodies_.size(), 0);
   const ContactView contacts = cache_.current().view();
@@ -135,7 +136,7 @@ bool SoftStep::any_body(const BodyStore& store, const Test& test) {
       std::logical_or<>());
 }
 
-/// Loads the bodies of a step: of the immovable ones, those that have a contact or a joint.
+/// Loads the bodies of a step, except immovable bodies without contacts and joints.
 void SoftStep::load(const BodyStore& store) {
   for_each_body(store, [this](std::uint32_t i) { step_.load(i); });
   if (store.mobile().size() == store.size()) return;

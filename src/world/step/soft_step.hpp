@@ -17,9 +17,9 @@ inline namespace JFPX_ABI {
 
 /// Moves the bodies of a world by one step. Owns its buffers, which grow and never shrink, and the
 /// contacts of the last step, whose impulses and colors are part of the state of the world.
-///
-/// A step: the caller fills contacts() and calls add_generated(), solve() and commit(). Without
-/// commit(), the next step has the contacts of the last completed one, and no pose or velocity has
+/// A step: the caller fills contacts() and calls add_generated(), solve() and commit(). If commit()
+/// is not called, poses and velocities are unchanged, and the next step starts with the contacts of
+/// the last completed step.
 /// changed.
 class SoftStep {
  public:
@@ -30,22 +30,22 @@ class SoftStep {
 
   /// Contacts of the current step, for ContactFinder::find_speculative_contacts().
   soft_step::ContactSet& contacts() { return cache_.current(); }
-  /// After commit(): contacts of the step before the last one, until the next detection.
+  /// After commit(): contacts of the second-to-last step, until the next detection.
   soft_step::ContactView contacts_before() { return cache_.current().view(); }
   /// Contacts of the last completed step, with their impulses and colors.
   soft_step::ContactSet& last_contacts() { return cache_.last(); }
-  /// The same. drop_removed() must have been called since the last forget().
+  /// Const overload. drop_removed() must have been called since the last forget().
   const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
   /// Adds the contacts of contact generators.
   void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
   /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
-  /// added up.
-  /// @returns the first body that is_in_world() refuses, if there is one
-  /// @param joints its arrays are valid until commit(); `now` receives what they keep
+  /// summed before.
+  /// @returns the first body for which is_in_world() is false, if any
+  /// @param joints its arrays are valid until commit(); `now` receives their impulses
   std::optional<BodyId> solve(BodyStore* bodies, const soft_step::JointView& joints);
   /// Moves the bodies, clears forces, and puts islands to sleep.
   void commit(BodyStore* bodies) noexcept;
-  /// Makes room for bodies with indices below `bodies`. @throws std::bad_alloc
+  /// Reserves memory for bodies with indices below `bodies`. @throws std::bad_alloc
   void reserve(std::size_t bodies) { cache_.reserve(bodies); }
   /// Replaces the parameters of the constructor and the contacts of the last completed step.
   void restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
@@ -54,13 +54,13 @@ class SoftStep {
   /// removal.
   void forget(std::uint32_t body) noexcept { cache_.forget(body); }
   void drop_removed() noexcept { cache_.drop_forgotten(); }
-  /// Replaces the contacts of the last step by those that a device has made of it, without those of
-  /// removed bodies.
+  /// Replaces the contacts of the last step by the contacts of a device, without those of removed
+  /// bodies.
   void replace_last_contacts(soft_step::ContactSet last) noexcept {
     cache_.replace_last(std::move(last));
     cache_.drop_forgotten();
   }
-  /// Must be called after a step on a device, whose contacts are all of existing bodies.
+  /// Must be called after a step on a device; no contact then refers to a removed body.
   void forget_none() noexcept { cache_.forget_none(); }
 
  private:

@@ -12,7 +12,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Whether the bodies of a contact touch, or meet during the step at their velocities.
+/// Whether the bodies of a contact touch, or will touch during the step at their velocities.
 JFPX_HD inline bool will_touch(const BodyView& bodies, const ContactView& contacts,
                                std::uint32_t contact) {
   const ContactKey& key = contacts.key(contact);
@@ -30,11 +30,11 @@ JFPX_HD inline bool has_touched(const ContactView& contacts, std::uint32_t conta
   });
 }
 
-/// Why a sleeping island wakes: it touches a kinematic body in motion or a body that is not slow,
-/// or it touches slow bodies only.
+/// Reasons for waking an island: contact with a kinematic body in motion or a body that is not
+/// slow, or contact with slow bodies only.
 inline constexpr std::uint8_t kTouchesFastBody = 1, kTouchesSlowBody = 2;
 
-/// Wakes a body of an island. @param mark of the island; 0: it does not wake
+/// Wakes a body of an island. @param mark of the island; 0: the island stays asleep
 JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& motion,
                                  std::uint32_t i, std::uint8_t mark) {
   if (mark == kTouchesFastBody) motion.wake(bodies, i);
@@ -61,7 +61,7 @@ struct StepBodies {
   const std::uint8_t* constrained = nullptr;  ///< kHasContact, kHasJoint, or 0
   Real h = 0;                                 ///< [s], length of a substep
 
-  /// Starts the step.
+  /// Initializes a body for the step.
   JFPX_HD void load(std::uint32_t i) const {
     if (bodies.is_active(i)) {
       motion.last_acceleration[i] = bodies.acceleration_of_step(i);
@@ -87,12 +87,12 @@ struct StepBodies {
     return bits;
   }
 
-  /// Starts a substep: applies accelerations, and, unless it is the first of the step, the contact
-  /// impulses of the last substep again. A body without contacts moves by the mean of its
-  /// velocities before and after, so that its path is an exact parabola; with contacts, the mean
-  /// would contain a part of the acceleration that impulses have cancelled. Forces may depend on
-  /// the position, and are constant in a step: they move the body as in the semi-implicit Euler
-  /// method for the whole step, because a spring would gain energy otherwise.
+  /// Starts a substep: applies accelerations and, except in the first substep, the contact impulses
+  /// of the last substep. A body without contacts moves by the mean of its velocities before and
+  /// after, so its path is an exact parabola. With contacts, the mean would contain acceleration
+  /// that the impulses have cancelled. Forces, which may depend on the position, are constant in a
+  /// step and integrated by semi-implicit Euler over the whole step; otherwise springs would gain
+  /// energy.
   JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, FreeMotion* free,
                           bool is_first) const {
     if (!bodies.is_active(i)) return;
@@ -120,8 +120,7 @@ struct StepBodies {
     orientation[i] = turned(orientation[i], *body);
   }
 
-  /// The orientation of a body after a substep. After an overflow it is zero, and remains so until
-  /// the step is undone.
+  /// The orientation of a body after a substep. An overflow makes it zero until the step is undone.
   JFPX_HD Quat turned(const Quat& before, const SolverBody& body) const {
     if (before == Quat{0, 0, 0, 0}) return before;
     return detail::integrated_orientation(before, body.angular_velocity, h);

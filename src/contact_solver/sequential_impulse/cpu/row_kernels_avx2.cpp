@@ -7,7 +7,7 @@ inline namespace JFPX_ABI {
 namespace cpu {
 namespace {
 
-/// The first field of body `id`. The id of a body that no row moves is its complement.
+/// The first field of body `id`. Bodies that no row moves are addressed by the complement.
 template <class T>
 T* field_of(T* base, std::int32_t id, int stride) {
   return base + std::ptrdiff_t{id ^ (id >> 31)} * stride;

@@ -19,19 +19,19 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Blocks of a color that are worth a thread: about half a microsecond of work, several times what
-/// the threads wait for each other.
+/// Minimum number of blocks per color and thread: about half a microsecond of work, several times
+/// the waiting time of the threads.
 constexpr std::uint32_t kBlocksPerPart = 12;
 /// Below this number of blocks, waking a second thread costs more than it saves.
 constexpr std::uint32_t kBlocksPerThread = 64;
-/// Number of waits after which a thread takes over the items of another one, which may have lost
-/// its core: some microseconds, longer than an item of blocks takes.
+/// Number of waits after which a thread executes the items of another thread, which may have been
+/// descheduled. Some microseconds, longer than an item of blocks.
 constexpr std::uint64_t kWaitsForOthers = 200;
-/// Number of bodies from whose positions the parts are derived, at most.
+/// Maximum number of bodies whose positions determine the parts.
 constexpr std::size_t kSample = 256;
 /// First of the two alternatives of the chooser; the other is one thread.
 constexpr std::size_t kSeveralThreads = 0;
-/// [us] Shorter than any sweep over a block, so that the chooser measures both alternatives.
+/// [us], shorter than any sweep over a block, so that the chooser measures both alternatives.
 constexpr double kLowerBoundBlockUs = 1e-4;
 
 double us_since(Clock::time_point start) {
@@ -55,42 +55,42 @@ bool all_finite(const Real* values, std::size_t count) {
 
 }  // namespace
 
-/// Progress of a part in a program. While shared contacts wait, threads of other parts read only
-/// the last member, so that it has a cache line of its own.
+/// Progress of a part in a program. While shared contacts wait, other threads read only the last
+/// member, which therefore has its own cache line.
 struct alignas(64) RowSolver::PartProgress {
   std::atomic<std::uint64_t> claimed, done;            ///< numbers of items
   alignas(64) std::atomic<std::uint64_t> shared_done;  ///< items whose shared contacts are done
 };
 
-/// Passes over the blocks, repeated until the residual is small. Each pass has a stage for each
-/// color, and each stage an item for each part of the bodies. The items of a part run one after the
-/// other: first the contacts that move a shared body, which contacts of other parts move, too, then
-/// the others. Shared contacts of a stage wait until those of all earlier stages in conflicting
-/// parts are done. A thread runs the items of its part, so that its caches keep them; while it
-/// waits, it runs those of parts whose threads are absent or late. A waiting thread has claimed
-/// nothing and may leave.
+/// Passes over the blocks, repeated until the residual is small. Each pass has one stage per color,
+/// and each stage one item per part of the bodies. The items of a part run one after the other. An
+/// item first solves the contacts that move a shared body, which contacts of other parts also move,
+/// then the remaining contacts. Shared contacts of a stage wait for the shared contacts of all
+/// earlier stages in conflicting parts. A thread runs the items of its part, so that they stay in
+/// its caches. While it waits, it runs items of parts whose threads are absent or late. A waiting
+/// thread has claimed no item and may leave.
 struct RowSolver::Program {
   struct Pass {
     RowSweep sweep;
-    const BlockRange* ranges;  ///< those of group g are its shared and its other blocks
+    const BlockRange* ranges;  ///< group g consists of shared blocks and other blocks
   };
 
   RowArrays arrays{};
   Pass passes[4];
   std::size_t pass_count = 0;
-  std::uint64_t iterations = 0;        ///< all iterations; the serial rows take part in each
+  std::uint64_t iterations = 0;        ///< all iterations, each of which includes the serial rows
   std::uint64_t block_iterations = 0;  ///< iterations that include the blocks
   SerialRows* serial = nullptr;
   Real threshold = -1;
   std::atomic<Real>* residuals = nullptr;  ///< one per iteration
   std::uint64_t colors = 0;
-  std::span<const std::uint64_t> conflicts{};  ///< by part: those with common bodies
+  std::span<const std::uint64_t> conflicts{};  ///< by part: set of parts with common bodies
   std::span<PartProgress> parts{};
   std::atomic<std::uint64_t> absent{0};       ///< parts without a thread; all at the start
   std::atomic<std::uint64_t> serial_done{0};  ///< sweeps over the serial rows
   std::atomic<bool> broken{false};
 
-  /// Runs the program, together with the other threads that join.
+  /// Runs the program together with the other threads that join.
   /// @param self the part of this thread; part 0 also solves the serial rows
   /// @return false if the backoff has reached its limit before the end
   bool join(std::uint32_t self, Backoff backoff) {
@@ -131,7 +131,7 @@ struct RowSolver::Program {
     return true;
   }
 
-  /// Completes an item of part `self`, or waits until another thread has.
+  /// Completes an item of part `self`, or waits until another thread has completed it.
   bool complete(std::uint64_t stage, std::uint32_t self, Backoff backoff) {
     const PartProgress& part = parts[self];
     if (part.done.load(std::memory_order_acquire) > stage) return true;
@@ -144,7 +144,7 @@ struct RowSolver::Program {
     return true;
   }
 
-  /// Waits until all parts have completed so many items.
+  /// Waits until all parts have completed this number of items.
   bool wait_for_all(std::uint64_t items, std::uint32_t self, Backoff backoff) {
     const auto is_done = [&](const PartProgress& part) {
       return part.done.load(std::memory_order_acquire) >= items;
@@ -155,8 +155,8 @@ struct RowSolver::Program {
     return true;
   }
 
-  /// Runs an item below `end` of a part whose thread is absent, or after some waits, late. If there
-  /// is none, waits a moment.
+  /// Runs an item below `end` of a part whose thread is absent or, after some waits, late. If there
+  /// is none, waits briefly.
   bool help_or_wait(std::uint64_t end, std::uint32_t self, std::uint64_t waits, Backoff* backoff) {
     const bool helps_late = waits % kWaitsForOthers == 0;
     const std::uint64_t missing = absent.load(std::memory_order_relaxed);
@@ -224,7 +224,7 @@ RowSolver::~RowSolver() = default;
 
 RowSolver::RowSolver(unsigned threads, SimdLevel simd)
     : kernels_(row_kernels(simd)), pool_(threads) {
-  // The pool may have more threads later.
+  // The number of threads of the pool may grow later.
   most_parts_ = std::min(pool_.threads(), kMaxParts);
   progress_ = std::make_unique<PartProgress[]>(kPrograms * most_parts_);
 }
@@ -260,7 +260,7 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   assign_groups();
   const std::size_t groups = group_count();
   ranges_.reserve(groups, "contacts of a solver");
-  // The blocks of a part follow each other, so that its thread sets them up.
+  // The blocks of a part are consecutive, so that its thread sets them up.
   blocks_ = 0;
   for (std::size_t part = 0; part < parts_; ++part) {
     for (std::size_t color = 0; color < colors(); ++color) {
@@ -290,7 +290,7 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
 }
 
 /// Assigns a group to each contact: its color, the part of its first moving body, and whether it
-/// moves a shared body. Counts the contacts of each group, and finds the parts that conflict.
+/// moves a shared body. Counts the contacts of each group, and determines the conflicting parts.
 void RowSolver::assign_groups() {
   groups_.reserve(pairs_.size(), "contacts of a solver");
   next_lane_.reserve(group_count(), "contacts of a solver");
@@ -333,7 +333,7 @@ void RowSolver::mark_shared_bodies() {
   }
 }
 
-/// Chooses between one part and as many threads as have kBlocksPerPart blocks of each color on
+/// Selects either one part or as many threads as have kBlocksPerPart blocks of each color on
 /// average.
 void RowSolver::choose_parts() {
   const std::size_t blocks = pairs_.size() / kernels_.lanes;
@@ -352,7 +352,7 @@ void RowSolver::choose_parts() {
 /// Divides the bodies into parts of about equal numbers along the longest axis, so that few
 /// contacts join bodies of two parts. The results do not depend on the parts.
 void RowSolver::divide_bodies() {
-  // Quantiles of a sample, because single bodies may be far away.
+  // Quantiles of a sample, because single bodies may be outliers.
   std::array<Real, kSample> longest{};
   std::size_t count = 0;
   int axis = 0;
@@ -447,8 +447,8 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   const std::size_t factors = with_factors ? 1 : 0;
   std::uint64_t split_rows = 0;
   if (settings.split_impulse) {
-    // Most contacts do not penetrate deeply enough for a split impulse: only blocks that contain
-    // such a contact are swept.
+    // Most contacts do not penetrate deeply enough for a split impulse: sweeps only the blocks that
+    // contain such a contact.
     select(
         [&](std::uint32_t block) {
           const Real* rhs = contact_rows(block) + std::size_t{rows::kRowSplitRhs} * kernels_.lanes;
@@ -514,9 +514,8 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   if (rolling_friction_blocks_.count > 0) {
     add(&main, kernels_.rolling_frictions[factors], rolling_friction_blocks_.ranges.data());
   }
-  // The first participant always stays, so that the work is completed. The others leave when they
-  // wait for long: then there are more threads than free processors, and they only take time from
-  // the threads that work.
+  // The first participant always stays, so that the work is completed. Other participants leave
+  // after a long wait: more threads than free processors only delay the working threads.
   const auto start = chooser_ != nullptr ? Clock::now() : Clock::time_point{};
   pool_.run(parts_, [&](std::size_t participant) {
     const auto self = static_cast<std::uint32_t>(participant);

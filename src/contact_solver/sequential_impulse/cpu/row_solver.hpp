@@ -43,8 +43,8 @@ struct RowSweepSettings {
   bool split_impulse = true;  ///< also run the sweeps of the split impulse
 };
 
-/// Owns its buffers, which only grow. Functions must be called in the order of their declaration,
-/// by one thread at a time.
+/// Owns its buffers, which grow and never shrink. Functions must be called in the order of their
+/// declaration, by one thread at a time.
 class JFPX_API RowSolver {
  public:
   /// @param threads upper limit; 0: one per core. Sweeps use one thread where that has been faster.
@@ -63,7 +63,7 @@ class JFPX_API RowSolver {
     return push_velocities_.data() + slot_of(i) * rows::kVelocityFields;
   }
   Real* factors(std::size_t i) { return factors_.data() + slot_of(i) * rows::kFactorFields; }
-  /// Threads share the bodies by their positions, which only affect the speed.
+  /// Positions determine how threads share the bodies; they affect the speed only.
   void set_position(std::size_t i, const Vec3& position) { positions_[i] = position; }
 
   /// Arranges the contacts, given in their serial order, in blocks of one color and one part of the
@@ -150,14 +150,14 @@ class JFPX_API RowSolver {
     }
   }
 
-  /// Groups of contacts: 2 * (color * parts + part) for those that move a shared body, which
-  /// contacts of another part move, too, and the next number for the others.
+  /// Groups of contacts: 2 * (color * parts + part) for contacts that move a shared body, which
+  /// contacts of another part also move; the next number for other contacts.
   std::size_t group_count() const { return std::size_t{2} * colors() * parts_; }
   void choose_parts();
   void divide_bodies();
   void assign_slots();
   void to_slots(Buffer<Real>* values, std::size_t fields);
-  /// The place of a body in the arrays that sweeps change.
+  /// Index of a body in the arrays that sweeps change.
   std::size_t slot_of(std::size_t body) const { return is_divided_ ? slots_[body] : body; }
   std::int32_t slot_of_id(std::int32_t id) const {
     const auto slot = [&](std::int32_t i) {
@@ -178,7 +178,7 @@ class JFPX_API RowSolver {
   Buffer<Vec3> positions_;
   std::span<const RowPair> pairs_;
   bool is_divided_ = false;            ///< whether the bodies have parts and slots
-  Buffer<std::uint8_t> part_of_body_;  ///< with kIsShared if contacts of other parts move it
+  Buffer<std::uint8_t> part_of_body_;  ///< with kIsShared if contacts of other parts move the body
   Buffer<std::uint32_t> slots_;        ///< by body, in the order of the parts; 0 for the fixed body
   Buffer<Real> spare_values_;
   Buffer<Real> contacts_, frictions_, rolling_frictions_;
@@ -187,16 +187,16 @@ class JFPX_API RowSolver {
   Buffer<std::uint32_t> groups_;  ///< by contact
   Buffer<BlockRange> ranges_;     ///< of the blocks, by group
   Buffer<std::uint64_t>
-      parts_of_body_;  ///< by shared body: its part, and those whose contacts move it
-  std::array<std::uint64_t, kMaxParts> conflicts_{};  ///< by part: those with common bodies
+      parts_of_body_;  ///< by shared body: its part, and the parts whose contacts move it
+  std::array<std::uint64_t, kMaxParts> conflicts_{};  ///< by part: set of parts with common bodies
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
   std::uint32_t most_parts_ = 1;
   std::unique_ptr<PartProgress[]> progress_;  ///< by program and part
-  /// Choose between several threads and one, by the number of bits of the number of blocks.
+  /// Choosers between several threads and one, by the bit width of the number of blocks.
   std::vector<TimeChooser> choosers_ = std::vector(33, TimeChooser(2));
-  TimeChooser* chooser_ = nullptr;  ///< null: only one thread is useful
+  TimeChooser* chooser_ = nullptr;  ///< null: a single thread is used
   double predicted_us_ = 0;         ///< [us], of an iteration
   double division_us_ = 0;          ///< [us], of the division of the bodies
 };

@@ -17,7 +17,7 @@ inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-/// Suballocates arrays from one block of memory. Without memory it only counts the bytes.
+/// Suballocates arrays from one block of memory. Without memory, counts the bytes only.
 class Arena {
  public:
   explicit Arena(std::byte* memory) : memory_(memory) {}
@@ -35,7 +35,7 @@ class Arena {
   std::size_t used_ = 0;
 };
 
-/// The last array is rarely full: only its used part is copied.
+/// The last array is rarely full; only its used part is copied.
 /// @param least_bytes receives the size without the last array
 GroupInputs allocate_inputs(const GroupSize& size, Arena* arena, std::size_t* least_bytes) {
   GroupInputs in{};

@@ -1,5 +1,5 @@
-/// Kernels of the row solver. In the sweeps, each thread solves some contacts and waits for their
-/// sequence numbers; in the others, each thread processes one contact.
+/// Kernels of the row solver. In the sweeps, each thread solves several contacts and waits for
+/// their sequence numbers; in the other kernels, each thread processes one contact.
 #include "src/base/cuda/launch.cuh"
 #include "src/base/cuda/warp.cuh"
 #include "src/contact_solver/sequential_impulse/cuda/row_kernels.hpp"
@@ -12,13 +12,13 @@ namespace cuda {
 namespace {
 
 constexpr unsigned kSetUpThreads = 128;
-/// Small, so that contacts are spread over all multiprocessors before they share one.
+/// Small, so that contacts are spread over all multiprocessors first.
 constexpr unsigned kSweepThreads = 64;
 constexpr unsigned kWarpsPerBlock = kSweepThreads / 32;
-/// Limit of consecutive unsuccessful polls of a warp: some seconds. Only a defect can reach it.
+/// Limit of consecutive unsuccessful polls of a warp: some seconds. Only reached by a defect.
 constexpr unsigned kMaxPolls = 1u << 23;
-/// Contacts that a lane solves serially before further lanes of its warp are used: divergence of
-/// the lanes of a warp costs more.
+/// Contacts that a lane solves serially before further lanes of its warp are used, because
+/// divergence within a warp costs more.
 constexpr std::size_t kContactsPerLane = 64;
 
 struct DeviceCells {
@@ -50,7 +50,7 @@ __device__ unsigned warp_min(unsigned value) {
 }
 
 /// Runs a worker in every lane. All lanes of a warp poll in the same loop iteration, so that no
-/// lane can wait for another lane of its own warp.
+/// lane blocks another lane of its own warp.
 template <bool kFactors, bool kSplitImpulse>
 __device__ void run_workers(const RowSweepArgs& args, unsigned thread, unsigned threads,
                             BlockResults* results) {
@@ -134,7 +134,7 @@ unsigned max_row_blocks(int device) {
   JFPX_CUDA_TRY(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
   for (const auto kernel : {sweep_rows<false>, sweep_rows<true>}) {
     int blocks = 0;
-    // With the shared memory of the maximum number of iterations.
+    // Assumes the shared memory of the maximum number of iterations.
     JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, kSweepThreads,
                                                                 shared_bytes(1024)));
     min_blocks = min_blocks == 0 ? blocks : std::min(min_blocks, blocks);

@@ -11,7 +11,8 @@ inline namespace JFPX_ABI {
 namespace cuda {
 
 /// Results of the kernels for a group. All bytes must be 0 at the start. `largest` follows in
-/// memory, with two entries per iteration: first all of the sweeps, then all of the split impulse.
+/// memory, with two entries per iteration: first those of all sweeps, then those of the split
+/// impulse.
 struct SweepResults {
   unsigned long long split_impulses;  ///< number of contacts with a split impulse
   std::uint32_t broken;               ///< 1: a value is infinite or NaN

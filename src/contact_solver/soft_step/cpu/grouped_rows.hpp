@@ -16,7 +16,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Rows are divided among threads by blocks of so many bodies.
+/// Rows are divided among threads by blocks of this many bodies.
 inline constexpr std::uint32_t kBodiesPerBlock = 128;
 constexpr std::size_t block_count(std::size_t bodies) {
   return (bodies + kBodiesPerBlock - 1) / kBodiesPerBlock;
@@ -26,15 +26,15 @@ constexpr std::size_t block_count(std::size_t bodies) {
 using GroupCounts = std::array<std::uint32_t, kGroups>;
 
 /// Rows of one kind, sorted by group. Within the overflow and each color, rows are sorted by the
-/// lower body of their contact, and are divided at the same blocks of bodies. A thread that takes
-/// the same blocks of each group, and of the bodies, therefore has most of them in its own cache.
+/// lower body of their contact and divided at the same blocks of bodies. A thread that processes
+/// the same blocks in each group therefore has most of its rows and bodies in its own cache.
 ///
 /// Usage in a step: start(), place() for all rows before kFixedGroup, finish().
 /// @param Row one of RowTypes
 template <class Row>
 class GroupedRows {
  public:
-  Buffer<Row> rows;                ///< size() of them
+  Buffer<Row> rows;                ///< its first size() elements are used
   Buffer<std::uint32_t> contacts;  ///< by row
 
   std::uint32_t size() const { return begin_[kGroups]; }
@@ -43,7 +43,7 @@ class GroupedRows {
   std::uint32_t size(std::size_t group) const { return end(group) - begin(group); }
 
   /// @param counts by group
-  /// @param groups end of the groups before kFixedGroup that have rows
+  /// @param groups end of the nonempty groups before kFixedGroup
   void start(const GroupCounts& counts, std::size_t groups, std::size_t bodies) {
     begin_[0] = 0;
     for (std::size_t g = 0; g < kGroups; ++g) begin_[g + 1] = begin_[g] + counts[g];
@@ -57,8 +57,8 @@ class GroupedRows {
     }
   }
 
-  /// Assigns a contact to a row of a group before kFixedGroup. Several threads may do so
-  /// concurrently. @param body lower body of the contact
+  /// Assigns a contact to a row of a group before kFixedGroup. May be called concurrently.
+  /// @param body lower body of the contact
   void place(std::size_t group, std::uint32_t row, std::uint32_t contact, std::uint32_t body) {
     contacts[row] = contact;
     std::atomic_ref begin(block_begin_[group * blocks_ + body / kBodiesPerBlock]);
@@ -68,19 +68,19 @@ class GroupedRows {
   }
 
   void finish() {
-    // A block without rows begins where the next one does.
+    // A block without rows begins where the next block begins.
     for (std::size_t i = block_begin_.size(); i-- > 0;) {
       if ((i + 1) % blocks_ == 0) continue;  // last block of a group
       block_begin_[i] = std::min(block_begin_[i], block_begin_[i + 1]);
     }
   }
 
-  /// First row of a group before kFixedGroup for the bodies of a block, to within a few rows; for
+  /// First row of a group before kFixedGroup for the bodies of a block, to within a few rows. For
   /// `block` = block_count(bodies), the end of the group.
   std::uint32_t begin(std::size_t group, std::size_t block) const {
     if (block >= blocks_) return end(group);
     const std::uint32_t row = block_begin_[group * blocks_ + block];
-    // Rounded to the longest vector, so that only the last rows of a group are less than one.
+    // Rounded to the longest vector, so that only the last vector of a group is incomplete.
     constexpr std::uint32_t kRowsPerVector = 8;
     return row - (row - begin(group)) % kRowsPerVector;
   }

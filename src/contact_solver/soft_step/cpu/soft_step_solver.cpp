@@ -54,8 +54,8 @@ const cpu::SphereSweepKernels* kernels_for(SimdLevel level) {
 SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
     : pool_(pool), kernels_(kernels_for(usable_simd_level(simd))) {}
 
-/// Counting sort of the contacts and joints into rows by kind and group. Rows of a group are in the
-/// order of their numbers, those with fixed bodies in the order of bodies.
+/// Counting sort of the contacts and joints into rows by kind and group. Within a group, rows are
+/// ordered by number; rows with fixed bodies are ordered by body.
 void SoftStepSolver::sort_contacts() {
   count_contacts();
   Counts before;
@@ -109,7 +109,7 @@ void SoftStepSolver::count_contacts() {
                                  std::ranges::max);
 }
 
-/// Assigns rows to the contacts of a chunk. @param before number of rows in the chunks before
+/// Assigns rows to the contacts of a chunk. @param before number of rows in earlier chunks
 void SoftStepSolver::place_contacts(std::uint32_t first, std::uint32_t last, Counts before) {
   for (std::uint32_t i = first; i < last; ++i) {
     const RowKind kind = kinds_[i];
@@ -144,7 +144,7 @@ void SoftStepSolver::place_fixed_contacts() {
   }
 }
 
-/// Assigns parts to the rows that have some.
+/// Assigns parts to the rows of kinds with parts.
 void SoftStepSolver::place_parts() {
   for_all_kinds([this]<class Row>(Rows<Row>* rows) {
     if constexpr (kHasParts<Row>) {
@@ -199,7 +199,7 @@ void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
   });
   const std::size_t blocks = block_count(bodies_);
   for (std::size_t group = group_of_color(0); group < colored_end_; ++group) {
-    // One loop over the rows of all kinds: the end of a loop costs as much as dozens of rows.
+    // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
     std::size_t count = 0;
     for_all_kinds([&](auto* rows) { count += rows->size(group); });
     if (count == 0) continue;
@@ -223,7 +223,7 @@ void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
   });
 }
 
-/// @param kernel null: rows of spheres are treated one by one
+/// @param kernel null: rows of spheres are solved one by one
 template <class Operation>
 void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
                          cpu::SphereSweepFunction kernel) {

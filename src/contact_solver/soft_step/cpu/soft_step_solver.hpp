@@ -20,23 +20,23 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Solves contacts and joints in this order: the overflow, for which no color was free, one after
-/// the other; the colors in ascending order; those with immovable and kinematic bodies or with the
-/// world, by movable body, joints first. In the overflow, rows are in the order of RowTypes. Rows
-/// of one color share no movable body, so threads may solve them in any order, and so may those of
-/// different movable bodies with fixed bodies.
+/// Solves contacts and joints in this order: the overflow (rows without a free color), one after
+/// the other; the colors in ascending order; rows with immovable or kinematic bodies or with the
+/// world, by movable body, joints first. In the overflow, rows have the order of RowTypes. Rows of
+/// one color share no movable body, so threads may solve them in any order. The same holds for rows
+/// of different movable bodies with fixed bodies.
 ///
-/// Owns its buffers, which only grow. In a step: build(), then warm_start(), solve() and
-/// restitute() as the integrator requires, then store().
+/// Owns its buffers, which grow and never shrink. In a step: build(), then warm_start(), solve()
+/// and restitute() as the integrator requires, then store().
 class SoftStepSolver {
  public:
   /// @param pool not null; outlives the solver
   /// @param simd widest vectors for rows of spheres
   SoftStepSolver(ThreadPool* pool, SimdLevel simd);
 
-  /// Makes rows of the contacts and joints whose kind is not kNoRow. Below, "contact" is the number
-  /// of either; see RowSetup.
-  /// @param setup     its arrays are valid until store()
+  /// Builds rows of the contacts and joints whose kind is not kNoRow. Below, "contact" is the
+  /// number of a contact or joint; see RowSetup.
+  /// @param setup     its arrays must be valid until store()
   /// @param bodies    number of bodies in these arrays
   void build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
              const StepConstants& constants);
@@ -44,7 +44,7 @@ class SoftStepSolver {
   void warm_start(std::span<SolverBody> bodies);
   /// A sweep over all contacts. @param use_bias whether it is a bias sweep or a relax sweep
   void solve(std::span<SolverBody> bodies, bool use_bias);
-  /// Makes the bodies of impacts rebound, but for spheres, which rebound in solve().
+  /// Applies restitution. Rows of spheres have already rebounded in solve().
   void restitute(std::span<SolverBody> bodies);
   /// Writes the impulses to the contacts that build() received.
   void store();
@@ -78,7 +78,7 @@ class SoftStepSolver {
     std::uint32_t row = 0;
     RowKind kind = kNoRow;
   };
-  /// Numbers of rows by kind and group, of a chunk of contacts.
+  /// Numbers of rows of a chunk of contacts, by kind and group.
   struct Counts {
     std::array<GroupCounts, kRowKinds> by_kind{};
     std::uint32_t fixed = 0;
@@ -99,14 +99,14 @@ class SoftStepSolver {
   void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
   void place_fixed_contacts();
   void place_parts();
-  /// Calls run(rows, first, last) for the rows of the overflow and of the colors, one at a time in
-  /// the overflow, whose rows may share bodies, and on_fixed(rows, row) for each row with a fixed
-  /// body. `rows` is a pointer to Rows.
+  /// Calls run(rows, first, last) for the rows of the overflow and of the colors, and
+  /// on_fixed(rows, row) for each row with a fixed body. Overflow rows may share bodies and are
+  /// passed one at a time. `rows` is a pointer to Rows.
   template <class Run, class OnFixed>
   void sweep(const Run& run, const OnFixed& on_fixed);
-  /// Calls operation(rows, first, last, is_fixed) for ranges of all rows, where `rows` is a pointer
-  /// to Rows, and `is_fixed` whether one body is: std::true_type or std::false_type. The rows of a
-  /// block of bodies follow each other, because their contacts do.
+  /// Calls operation(rows, first, last, is_fixed) for ranges of all rows. `rows` is a pointer to
+  /// Rows; `is_fixed` is std::true_type if body b is fixed and std::false_type otherwise. The rows
+  /// of a block of bodies are consecutive, because their contacts are.
   template <class Operation>
   void for_all_rows(const Operation& operation);
   template <class Operation>
@@ -119,12 +119,12 @@ class SoftStepSolver {
   RowSetup setup_;                          ///< from build() to store()
   ImpactBodies impacts_;
   StepConstants constants_;
-  std::size_t bodies_ = 0;  ///< number of bodies, those of mass 0 included
+  std::size_t bodies_ = 0;  ///< number of bodies, including those of mass 0
 
   std::vector<RowKind> kinds_;  ///< by contact
   std::vector<Counts> counts_;  ///< by chunk of contacts
   RowsOfTypes<RowTypes>::type rows_;
-  std::size_t colored_end_ = 0;  ///< end of the overflow and of the colors that occur, as groups
+  std::size_t colored_end_ = 0;      ///< end of the overflow and of the occurring colors, as groups
   std::vector<FixedContact> fixed_;  ///< sorted by (body, RowSetup::fixed_order())
   // Body b of a joint with the world.
   SolverBody world_;

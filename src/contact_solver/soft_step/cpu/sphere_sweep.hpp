@@ -1,9 +1,9 @@
-/// Vector kernels of the soft step for rows of two spheres. With narrower vectors than those of
-/// AVX2, rows are solved one by one.
+/// Vector kernels of the soft step for rows of two spheres. Without AVX2, rows are solved one by
+/// one.
 #pragma once
 
-// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason. So rows and
-// bodies are arrays of Reals here, and soft_step_solver.cpp checks their layout.
+// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason. Rows and
+// bodies are therefore arrays of Reals; soft_step_solver.cpp checks their layout.
 #include <jfpx/config.hpp>
 
 #include <cstddef>
@@ -32,31 +32,30 @@ inline constexpr std::size_t kAngularVelocity = 4;  ///< angular velocity, inver
 inline constexpr std::size_t kShift = 8;            ///< shift, unused
 }  // namespace solver_body_quad
 
-/// As soft_step::Softness.
+/// Copy of soft_step::Softness.
 struct SweepSoftness {
   Real bias_rate, mass_scale, impulse_scale;
 };
 
-/// Rows of pairs of movable spheres, no two of which have a body in common.
+/// Rows of pairs of movable spheres without common bodies.
 struct SphereSweep {
   Real* rows;    ///< SphereRow
   Real* bodies;  ///< SolverBody
-  // As StepConstants.
+  // Copies of members of StepConstants.
   Real h, inverse_h, push_out_speed, max_bias_velocity, restitution_threshold;
   SweepSoftness balls, deep_balls;
   Real deep_penetration;  ///< soft_step::kDeepPenetration
 };
 
-/// Does with the rows [first, last) what the functions of sphere_row.hpp do with one, but leaves
-/// out some of them.
-/// @param left receives the rows that are left out, at most last - first
-/// @returns their number
+/// Processes the rows [first, last) like the functions of sphere_row.hpp, but skips some rows.
+/// @param left receives the skipped rows, at most last - first
+/// @returns the number of skipped rows
 using SphereSweepFunction = std::size_t (*)(const SphereSweep& sweep, std::size_t first,
                                             std::size_t last, std::uint32_t* left);
 
 struct SphereSweepKernels {
   SphereSweepFunction warm_start;
-  /// Index 1: with bias. They leave out rows whose bodies may rebound.
+  /// Index 1: with bias. Skip rows whose bodies may rebound.
   SphereSweepFunction solve[2];
 };
 

@@ -98,7 +98,7 @@ class RowLanes {
     b.store(sweep_, b_, kAll);
   }
 
-  /// @returns one bit per lane: whether the bodies may rebound. These rows are left out.
+  /// @returns one bit per lane: whether the bodies may rebound. These rows are skipped.
   template <bool kUseBias>
   unsigned solve() const {
     const Vec zero = S::set(0);
@@ -203,7 +203,7 @@ class RowLanes {
   std::uint32_t rows_[kLanes], a_[kLanes], b_[kLanes];
 };
 
-/// Requests the bodies of at most `count` rows, which other threads may have written in the last
+/// Prefetches the bodies of at most `count` rows, which other threads may have written in the last
 /// color.
 void prefetch_bodies(const SphereSweep& sweep, std::size_t first, std::size_t count,
                      std::size_t last) {
