@@ -21,4 +21,13 @@ from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepRepor
 
 __version__ = "0.2.0"
 
-__all__ = [name for name in dir() if not name.startswith("_")]
+__all__ = [
+    "Attachment", "available_backends", "BackendUnavailable", "BEGIN", "BodyId", "BodyState",
+    "Bungee", "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactRows", "Contacts",
+    "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError",
+    "find_contacts", "find_pairs", "ForceContext", "Gravity", "InvalidArgument", "InvalidScene",
+    "InvalidSnapshot", "JointId", "JointState", "OutOfMemory", "PeriodicContactRows",
+    "PeriodicContacts", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
+    "RecordingWriter", "Rows", "Scene", "scene_names", "SphereCollider", "Spring", "States",
+    "STAY", "StepReport", "World", "WorldContacts",
+]

@@ -81,6 +81,11 @@ def options(backend: Any, algorithm: Any, threads: Any, device: Any) -> tuple[st
 
 def to_host(array: Any, name: str) -> np.ndarray:
     """An array in host memory as a NumPy array, without a copy where it has DLPack."""
+    if isinstance(array, np.ma.MaskedArray):
+        if np.ma.is_masked(array):
+            raise InvalidArgument(f"{name} has masked elements; pass an array without them, such as "
+                                  f"{name}[~{name}.mask.any(axis=1)].data")
+        return array.data
     if isinstance(array, np.ndarray):
         return array
     if type(array).__module__ == "torch" or hasattr(array, "detach"):
@@ -89,6 +94,9 @@ def to_host(array: Any, name: str) -> np.ndarray:
         try:
             return np.from_dlpack(array)
         except (BufferError, RuntimeError, TypeError) as error:
+            dtype = str(getattr(array, "dtype", "")).removeprefix("torch.")
+            if dtype in ("bfloat16", "float16", "half") or dtype.startswith("float8"):
+                raise InvalidArgument(f"{name} has dtype {dtype}; it must be float32 or float64") from None
             raise InvalidArgument(f"{name} cannot be read: {error}") from None
     try:
         return np.asarray(array, None if hasattr(array, "dtype") else np.float64)
@@ -119,18 +127,45 @@ def rows(array: Any, name: str, columns: int, dtype: Any = None) -> np.ndarray:
 
 
 def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
-    """A number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
+    """Radii: a number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
+    if isinstance(array, (bool, np.bool_)):
+        raise InvalidArgument(f"{name} is {array}; it must be a number or an array of shape ({size},)")
     if isinstance(array, (int, float, np.integer, np.floating)):
-        return np.full(1, array, dtype)
+        return check_radii(_single(array, dtype), name)
     given = hasattr(array, "dtype")
     array = to_host(array, name)
     if array.ndim == 0:
-        return np.full(1, array, dtype)
+        return check_radii(_single(array, dtype), name)
     if array.shape != (size,):
         raise InvalidArgument(f"{name} has shape {array.shape}; it must be a number or ({size},)")
     array = floats(array, name, dtype if given else None).astype(dtype, copy=False)
     # One value for all and one value for one row are the same.
-    return array if size else np.ones(1, dtype)
+    return check_radii(array, name) if size else np.ones(1, dtype)
+
+
+def check_square(distance: float, what: str, dtype: Any) -> None:
+    """Raises InvalidArgument unless the square of a distance is exact to the precision of the dtype.
+    @param what names the argument and its value"""
+    limits = np.finfo(dtype)
+    low, high = math.sqrt(float(limits.tiny) / float(limits.eps)), math.sqrt(float(limits.max))
+    if not low <= distance <= high:
+        raise InvalidArgument(f"{what}, and the square of the distance {distance:g} is not exact in "
+                              f"{np.dtype(dtype)}; use a unit of length in which distances are in [{low:.2g}, {high:.2g}]")
+
+
+def check_radii(radii: np.ndarray, name: str) -> np.ndarray:
+    """Raises as check_square() for the sum of two radii. Leaves invalid radii to the search, which names
+    the first one. @returns the radii"""
+    low, high = radii.min(), radii.max()
+    if 0 < low and high < np.inf:
+        for radius in (low, high):
+            check_square(2 * float(radius), f"{name} has the radius {radius:g}", radii.dtype)
+    return radii
+
+
+def _single(value: Any, dtype: Any) -> np.ndarray:
+    with np.errstate(over="ignore"):  # infinity is refused where it is not allowed
+        return np.full(1, value, dtype)
 
 
 def converted(array: Any, name: str, dtype: Any) -> np.ndarray:
@@ -153,14 +188,17 @@ def floats(array: np.ndarray, name: str, dtype: Any = None) -> np.ndarray:
     return array
 
 
-def offsets(array: Any, name: str) -> np.ndarray:
-    """Ascending integers as uint64."""
+def offsets(array: Any, name: str, size: int) -> np.ndarray:
+    """Ascending integers as uint64, the first `size` of which would be numbers of systems by point."""
     array = to_host(array if hasattr(array, "dtype") else np.asarray(array), name)
     if array.ndim != 1 or array.dtype.kind not in "iu" or array.size == 0:
         raise InvalidArgument(f"{name} has shape {array.shape} and dtype {array.dtype}; it must be "
                               "integers in one dimension, beginning with 0")
     if array.min() < 0:
         raise InvalidArgument(f"{name} contains {array.min()}; offsets must be >= 0")
+    if array.size == size > 1 and array[-1] != size and np.all(array[:-1] <= array[1:]):
+        raise InvalidArgument(f"{name} has an element for each of {size} points; it must be the offsets of "
+                              f"the systems, such as numpy.append(0, numpy.bincount({name}).cumsum())")
     return np.ascontiguousarray(array, np.uint64)
 
 
@@ -177,6 +215,8 @@ def triple(value: Any, name: str, size: int = 3) -> tuple[float, ...]:
 
 def number(value: Any, name: str) -> float:
     """A number that is not NaN."""
+    if isinstance(value, (bool, np.bool_, str, bytes)):  # which float() converts
+        raise InvalidArgument(f"{name} is {value!r}; it must be a number")
     try:
         result = float(value)
     except (TypeError, ValueError):
@@ -203,6 +243,10 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     each."""
     if lengths is None:
         return None
+    if getattr(lengths, "shape", None) == (3, 3) or _is_matrix(lengths, systems):
+        meaning = "" if systems != 3 else ", or a list of three tuples of lengths for the three systems"
+        raise InvalidArgument("periodic is a matrix; it must be the three lengths of an orthogonal cell, such as "
+                              f"periodic.diagonal(){meaning}")
     try:
         lengths = list(lengths)
     except TypeError:
@@ -215,9 +259,20 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     return np.array([_cell(row) for row in lengths])
 
 
+def _is_matrix(lengths: Any, systems: int | None) -> bool:
+    """Whether the argument is a list of three rows without systems that they could belong to."""
+    return (systems is None and hasattr(lengths, "__len__") and len(lengths) == 3
+            and all(hasattr(row, "__len__") and not isinstance(row, str) and len(row) == 3 for row in lengths))
+
+
 def _cell(lengths: Any) -> list[float]:
     if len(lengths) != 3:
         raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
+    for length in lengths:
+        if isinstance(length, (bool, np.bool_)) or (not isinstance(length, str) and np.ndim(length) == 0
+                                                    and length is not None and length == 0):
+            raise InvalidArgument(f"periodic is {tuple(lengths)}; it must be the three lengths of the cell, and "
+                                  "None along axes that do not repeat, such as (10, 10, None)")
     return [math.nan if length is None else number(length, "periodic") for length in lengths]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 
@@ -430,7 +430,7 @@ class _Search:
         self.dtype = self._positions.dtype
         size = self._positions.shape[0]
         self._radii = _arrays.vector(radii, "radii", size, self.dtype)
-        self._batch = None if batch is None else _arrays.offsets(batch, "batch")
+        self._batch = None if batch is None else _arrays.offsets(batch, "batch", size)
         self._query: Any = None
         self.periodic = False
 
@@ -518,13 +518,15 @@ def _half(cutoff: Any, dtype: str) -> float:
     radius = _exact_half(_arrays.number(cutoff, "cutoff"), dtype)
     if radius is None:
         raise InvalidArgument(f"cutoff is {cutoff}; it must be finite and > 0 in {dtype}")
+    _arrays.check_square(2 * radius, f"cutoff is {cutoff}", dtype)
     return radius
 
 
 @functools.lru_cache(maxsize=256)
 def _exact_half(cutoff: float, dtype: str) -> float | None:
     real = np.dtype(dtype).type
-    value = real(cutoff)
+    with np.errstate(over="ignore"):
+        value = real(cutoff)
     radius = value / real(2)  # before version 2, NumPy divides a float32 by 2 in float64
     return float(radius) if 0 < value < np.inf and radius + radius == value else None
 
@@ -596,6 +598,30 @@ def _of_devices(dtype: str) -> SphereCollider:
     return colliders[dtype]
 
 
+@overload
+def find_contacts(positions: Any, radii: Any, *, batch: Any = None,
+                  periodic: None = None, device: Any = None, output: Literal["coo"] = "coo", half: bool = True,
+                  index_dtype: Any = "int32", threads: int = 1) -> Contacts: ...
+
+
+@overload
+def find_contacts(positions: Any, radii: Any, *, batch: Any = None,
+                  periodic: None = None, device: Any = None, output: Literal["csr"], half: bool = True,
+                  index_dtype: Any = "int32", threads: int = 1) -> ContactRows: ...
+
+
+@overload
+def find_contacts(positions: Any, radii: Any, *, batch: Any = None,
+                  periodic: Any, device: Any = None, output: Literal["coo"] = "coo", half: bool = True,
+                  index_dtype: Any = "int32", threads: int = 1) -> PeriodicContacts: ...
+
+
+@overload
+def find_contacts(positions: Any, radii: Any, *, batch: Any = None,
+                  periodic: Any, device: Any = None, output: Literal["csr"], half: bool = True,
+                  index_dtype: Any = "int32", threads: int = 1) -> PeriodicContactRows: ...
+
+
 def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: Any = None,
                   device: Any = None, output: str = "coo", half: bool = True, index_dtype: Any = "int32",
                   threads: int = 1) -> Any:
@@ -609,6 +635,8 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     ----------
     positions : array (N, 3) of float32 or float64, N < 2^32, on a device N <= 2^31
         Centres, finite, in any unit of length: radii, distances and lengths of cells have the same.
+        The sum of two radii must be in [3.2e-16, 1.8e19] in float32 and in [1e-146, 1.3e154] in
+        float64, where its square is exact to a rounding; arrays of radii on a device are not checked.
         NumPy, any array with DLPack, or nested lists, which become float64. Any strides. Arrays of
         PyTorch and CuPy on a CUDA device, and those that share with them, are searched there in
         the order of the current stream.
@@ -659,6 +687,34 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
     search.set_periodic(periodic)
     collider = _shared(search.dtype, threads, device)
     return collider._find(search, output, half, index_dtype, None, contacts=True)
+
+
+@overload
+def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,
+               query_radii: Any = None, batch: Any = None,
+               periodic: None = None, device: Any = None, output: Literal["coo"] = "coo", half: bool = True,
+               index_dtype: Any = "int32", threads: int = 1) -> Any: ...
+
+
+@overload
+def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,
+               query_radii: Any = None, batch: Any = None,
+               periodic: None = None, device: Any = None, output: Literal["csr"], half: bool = True,
+               index_dtype: Any = "int32", threads: int = 1) -> Rows: ...
+
+
+@overload
+def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,
+               query_radii: Any = None, batch: Any = None,
+               periodic: Any, device: Any = None, output: Literal["coo"] = "coo", half: bool = True,
+               index_dtype: Any = "int32", threads: int = 1) -> PeriodicPairs: ...
+
+
+@overload
+def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,
+               query_radii: Any = None, batch: Any = None,
+               periodic: Any, device: Any = None, output: Literal["csr"], half: bool = True,
+               index_dtype: Any = "int32", threads: int = 1) -> PeriodicRows: ...
 
 
 def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: Any = None,

@@ -228,7 +228,8 @@ class DeviceSearch:
         size = rows.shape[0]
         start = (rows.address, size, *rows.strides)
         if isinstance(radii, (int, float)) or getattr(radii, "shape", None) == ():
-            return *start, 0, 0, float(radii)  # waits, where it is on the device
+            radius = np.full(1, float(radii), self.dtype)  # waits, where it is on the device
+            return *start, 0, 0, float(_arrays.check_radii(radius, name)[0])
         view = self._view(radii, name)
         if view.shape != (size,):
             raise InvalidArgument(f"{name} has shape {view.shape}; it must be a number or ({size},)")
@@ -248,7 +249,7 @@ class DeviceSearch:
         if is_on_device(batch):
             batch = _adapted(batch, "batch")
             batch = _functions(_library(batch)).to_host(batch)
-        self._batch = _arrays.offsets(batch, "batch")
+        self._batch = _arrays.offsets(batch, "batch", self._positions.shape[0])
 
     def set_periodic(self, lengths: Any) -> None:
         self._cells = _arrays.cells(lengths, None if self._batch is None else len(self._batch) - 1)

@@ -388,7 +388,7 @@ class World:
         states have equal bytes, on all backends. Raises OutOfMemory, DeviceError."""
         return self._core.snapshot()
 
-    def restore(self, snapshot: bytes) -> None:
+    def restore(self, snapshot: Any) -> None:
         """Replaces the state by that of a snapshot of this or of another world of the same dtype.
         The following steps are those that the other world would have made, to the last bit. The ids
         of bodies and the contacts are those of the snapshot; contact_events() has none until the
@@ -401,13 +401,17 @@ class World:
             The bytes are damaged, or of another version or dtype, or the world has other functions
             as forces. The world is then unchanged.
         InvalidArgument
-            `snapshot` is not of type bytes.
+            `snapshot` is neither bytes nor an object with a buffer, such as a memoryview.
         OutOfMemory
             The world is then unchanged.
         DeviceError
         """
         if not isinstance(snapshot, bytes):
-            raise InvalidArgument(f"snapshot is of type {type(snapshot).__name__}; it must be bytes")
+            try:
+                snapshot = bytes(memoryview(snapshot))
+            except TypeError:
+                raise InvalidArgument(f"snapshot is of type {type(snapshot).__name__}; it must be bytes, or "
+                                      "an object with a buffer") from None
         self._core.restore(snapshot)
 
     def close(self) -> None:

@@ -93,8 +93,6 @@ struct World::Impl {
   void remove_joints_of(std::uint32_t body);
   void begin_joint_edit(const JoinedBodies& joined);
   void complete_joint_edit(const JoinedBodies& joined);
-  template <class F>
-  void for_each_joined(const JoinedBodies& joined, const F& f);
   /// Fetches impulses and colors of the joints. Const functions may call it concurrently.
   void fetch_joints();
   /// Copies changed joints to the device.

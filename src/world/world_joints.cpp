@@ -15,25 +15,17 @@ namespace {
 void require_valid(const BodyStore& bodies, const Joint& joint) {
   std::string found = find_fault(joint);
   if (!found.empty()) throw InvalidArgument("joint: " + found);
-  bool any_movable = false;
   std::visit(
       [&](const auto& j) {
-        any_movable = bodies.movable(bodies.require(j.a));
-        if (j.b) any_movable |= bodies.movable(bodies.require(*j.b));
+        bodies.require(j.a);
+        if (j.b) bodies.require(*j.b);
       },
       joint);
-  if (any_movable) return;
+  if (joined_bodies(joint).any_movable(bodies)) return;
   throw InvalidArgument("joint: both bodies have mass 0; one of them must be movable");
 }
 
 }  // namespace
-
-/// Calls f(body) for the bodies of a joint.
-template <class F>
-void World::Impl::for_each_joined(const JoinedBodies& joined, const F& f) {
-  f(joined.a);
-  if (joined.b != soft_step::kWorld) f(joined.b);
-}
 
 /// Prepares a change of joints of two bodies, so that the change cannot fail.
 void World::Impl::begin_joint_edit(const JoinedBodies& joined) {
@@ -43,12 +35,12 @@ void World::Impl::begin_joint_edit(const JoinedBodies& joined) {
     edited_body_in_lists(joined.a, {.sets_pairs = true});
     edited_body_in_lists(joined.b, {});
   }
-  for_each_joined(joined, [this](std::uint32_t body) { edited_body(body, {}); });
+  joined.for_each([this](std::uint32_t body) { edited_body(body, {}); });
 }
 
 void World::Impl::complete_joint_edit(const JoinedBodies& joined) {
   mirror.joints = HostMirror::Joints::newer_on_host;
-  for_each_joined(joined, [this](std::uint32_t body) { wake(body); });
+  joined.for_each([this](std::uint32_t body) { wake(body); });
 }
 
 JointId World::Impl::add_joint(const Joint& joint) {
@@ -94,7 +86,7 @@ void World::Impl::remove_joints_of(std::uint32_t body) {
   joints.for_each_of(body, [&](std::uint32_t joint) {
     if (!any) fetch_joints();
     any = true;
-    for_each_joined(joined_bodies(joints.joint(joint)), [&](std::uint32_t i) {
+    joined_bodies(joints.joint(joint)).for_each([&](std::uint32_t i) {
       if (i != body) edited_body(i, {});
     });
   });
@@ -104,7 +96,7 @@ void World::Impl::remove_joints_of(std::uint32_t body) {
   joints.for_each_of(body, [&](std::uint32_t joint) {
     const JoinedBodies joined = joined_bodies(joints.joint(joint));
     joints.remove(joint);
-    for_each_joined(joined, [&](std::uint32_t i) {
+    joined.for_each([&](std::uint32_t i) {
       if (i != body) wake(i);
     });
   });

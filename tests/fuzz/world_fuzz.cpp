@@ -20,11 +20,12 @@ using fuzz::draw_body;
 using fuzz::draw_contact;
 using fuzz::draw_filter;
 using fuzz::draw_id;
+using fuzz::draw_joint;
 using fuzz::draw_state;
 using fuzz::require;
 using test::Bytes;
 
-constexpr std::size_t kMaxBodies = 20, kMaxForces = 8;
+constexpr std::size_t kMaxBodies = 20, kMaxForces = 8, kMaxJoints = 12;
 constexpr int kMaxCalls = 48;
 
 /// The result of a call, or the message of its exception.
@@ -207,6 +208,28 @@ void change_generators(Bytes& bytes, Twins& twins) {
   }
 }
 
+void change_joints(Bytes& bytes, Twins& twins) {
+  const auto joints = twins.world().joints();
+  const JointId id = joints.empty() ? JointId{7} : joints[bytes.below(joints.size())];
+  const DistanceJoint joint = draw_joint(bytes, twins.world().bodies());
+  switch (bytes.below(4)) {
+    case 0:
+      twins.both([&](World& w) { w.remove_joint(id); });
+      break;
+    case 1: {
+      const auto set = twins.both([&](World& w) { w.set_joint(id, joint); });
+      require(!set || twins.world().joint(id) == Joint(joint), "a joint is what was set");
+      break;
+    }
+    default:
+      if (joints.size() >= kMaxJoints) break;
+      twins.both([&](World& w) { return w.add_joint(joint); });
+  }
+  for (const JointId each : twins.world().joints()) {
+    twins.both([&](World& w) { return w.joint_state(each); });
+  }
+}
+
 void change_properties(Bytes& bytes, Twins& twins) {
   const BodyId id = draw_id(bytes, twins.world().bodies());
   switch (bytes.below(9)) {
@@ -312,6 +335,7 @@ void call_anything(Bytes& bytes, Twins& twins, std::optional<Snapshot>* kept) {
   // Inputs of the corpus keep their meaning: these bytes were steps.
   if (byte % 20 == 18) return change_properties(bytes, twins);
   if (byte % 20 == 9) return travel(bytes, twins, kept);
+  if (byte % 40 == 8) return change_joints(bytes, twins);
   switch (byte % 10) {
     case 0:
       if (twins.world().bodies().size() >= kMaxBodies) break;

@@ -168,6 +168,20 @@ GeneratedContact draw_contact(Bytes& bytes, std::span<const BodyId> bodies) {
   return contact;
 }
 
+DistanceJoint draw_joint(Bytes& bytes, std::span<const BodyId> bodies) {
+  DistanceJoint joint{.a = draw_id(bytes, bodies)};
+  if (bytes.chance(Real(0.7))) joint.b = draw_id(bytes, bodies);
+  joint.anchor_a = bytes.vector(-1, 1);
+  joint.anchor_b = bytes.vector(-2, 2);
+  if (bytes.chance(Real(0.7))) joint.max_length = bytes.number(0, 3);
+  if (bytes.chance(Real(0.3))) joint.min_length = joint.max_length;
+  if (bytes.chance(Real(0.5))) joint.hertz = bytes.number(0, 10);
+  joint.rest_length = bytes.number(0, 3);
+  joint.damping_ratio = bytes.number(0, 2);
+  joint.collide_connected = bytes.chance(Real(0.3));
+  return joint;
+}
+
 /// A spring or a bungee.
 template <class Elastic>
 Elastic draw_elastic(Bytes& bytes, std::span<const BodyId> bodies) {

@@ -21,3 +21,23 @@ def test_stubs_have_the_names_of_the_module(name):
             members = {node.name for node in declared[key].body
                        if isinstance(node, ast.FunctionDef)}
             assert members >= {member for member in vars(value) if not member.startswith("_")}
+
+
+def test_a_type_checker_sees_the_names_and_the_results(tmp_path):
+    api = pytest.importorskip("mypy.api")
+    program = tmp_path / "program.py"
+    program.write_text("""
+import jfpx
+points = [[0.0, 0.0, 0.0]]
+contacts: jfpx.Contacts = jfpx.find_contacts(points, 1.0)
+rows: jfpx.Rows = jfpx.find_pairs(points, 1.0, output="csr")
+images: jfpx.PeriodicPairs = jfpx.find_pairs(points, 1.0, periodic=(9, 9, None))
+report: jfpx.StepReport = jfpx.World("pile").step()
+""")
+    errors, _, status = api.run(["--strict", "--no-incremental", str(program)])
+    assert status == 0, errors
+
+
+def test_all_public_names_are_exported():
+    modules = {name for name, value in vars(jfpx).items() if type(value) is type(jfpx)}
+    assert set(jfpx.__all__) == {name for name in dir(jfpx) if not name.startswith("_")} - modules

@@ -58,8 +58,7 @@ JointId JointStore::add(const Joint& joint) {
   reserve_geometric(&now_, slots);
   BodyJoints added;
   const JoinedBodies bodies = joined_bodies(joint);
-  added.emplace(bodies.a, pool_.next_index());
-  if (bodies.b != soft_step::kWorld) added.emplace(bodies.b, pool_.next_index());
+  bodies.for_each([&](std::uint32_t body) { added.emplace(body, pool_.next_index()); });
   if (pool_.is_full()) pool_.add_slot();
   // From here on, nothing throws.
   joints_.resize(slots);
@@ -85,8 +84,7 @@ void JointStore::put(std::uint32_t slot, const Joint& joint) noexcept {
 
 void JointStore::remove(std::uint32_t joint) noexcept {
   const JoinedBodies bodies = joined_bodies(joints_[joint]);
-  of_body_.erase({bodies.a, joint});
-  of_body_.erase({bodies.b, joint});
+  bodies.for_each([&](std::uint32_t body) { of_body_.erase({body, joint}); });
   inputs_[joint] = {};
   last_[joint] = {};
   pool_.remove(id(joint));

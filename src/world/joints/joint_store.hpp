@@ -20,6 +20,20 @@ struct JoinedBodies {
   std::uint32_t a = 0, b = soft_step::kWorld;
   /// Whether the joint connects two bodies that must not collide with each other.
   bool excludes_contacts = false;
+
+  /// Calls f(body) for the bodies, except the world.
+  template <class F>
+  void for_each(const F& f) const {
+    f(a);
+    if (b != soft_step::kWorld) f(b);
+  }
+  /// Whether one of the bodies is movable, which every joint requires. @param bodies a BodyStore
+  template <class Bodies>
+  bool any_movable(const Bodies& bodies) const {
+    bool any = false;
+    for_each([&](std::uint32_t body) { any |= bodies.movable(body); });
+    return any;
+  }
 };
 JoinedBodies joined_bodies(const Joint& joint) noexcept;
 

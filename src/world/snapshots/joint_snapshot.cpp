@@ -28,10 +28,9 @@ void check_bodies(const Joint& joint, const BodyStore& bodies) {
       [&](const auto& j) {
         BinaryReader::require(bodies.contains(j.a) && (!j.b || bodies.contains(*j.b)),
                               "a joint is not of bodies of the world");
-        BinaryReader::require(bodies.movable(j.a.index) || (j.b && bodies.movable(j.b->index)),
-                              "a joint has no movable body");
       },
       joint);
+  BinaryReader::require(joined_bodies(joint).any_movable(bodies), "a joint has no movable body");
 }
 
 }  // namespace
