@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <tuple>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -20,12 +20,16 @@ struct Reduced {
 };
 
 Reduced reduce_all(std::span<const SphereInstance> spheres, const PeriodicCell& cell) {
-  Reduced reduced{{spheres.begin(), spheres.end()}, std::vector<ImageShift>(spheres.size())};
+  Reduced reduced{std::vector<SphereInstance>(spheres.size()),
+                  std::vector<ImageShift>(spheres.size())};
   for (std::size_t i = 0; i < spheres.size(); ++i) {
-    Vec3& centre = reduced.spheres[i].centre;
-    reduced.cells[i] = detail::reduce(&centre, cell);
+    reduced.spheres[i] = detail::reduced(spheres[i], cell, &reduced.cells[i]);
   }
   return reduced;
+}
+
+bool is_before(const detail::PeriodicImage& p, const detail::PeriodicImage& q) {
+  return std::pair(p.sphere, p.code) < std::pair(q.sphere, q.code);
 }
 
 /// Appends the images that may touch a sphere in the cell, in the order of the spheres and then of
@@ -46,39 +50,51 @@ std::vector<detail::PeriodicImage> append_images(std::vector<SphereInstance>* sp
   return images;
 }
 
-/// The contacts of valid spheres in a valid cell.
+/// The contacts of valid spheres in a valid cell. A row of pairs of the collider has the spheres b
+/// and then the images, which are sorted by their sphere and shift: merging both parts sorts the
+/// row.
 std::vector<PeriodicContact> find_in_cell(SphereCollider& collider,
                                           std::span<const SphereInstance> spheres,
                                           const PeriodicCell& cell) {
   Reduced reduced = reduce_all(spheres, cell);
-  // Touching spheres are at most two radii apart.
   const std::vector<detail::PeriodicImage> images =
-      append_images(&reduced.spheres, cell, 2 * detail::largest_radius(spheres));
+      append_images(&reduced.spheres, cell, 2 * detail::largest_radius(reduced.spheres));
   const std::size_t n = spheres.size();
+  const std::span<const SpherePair> pairs = collider.find_pairs(reduced.spheres);
+  const auto image_at = [&](const SpherePair& pair) {
+    return pair.b < n ? detail::PeriodicImage{pair.b, detail::kNoShift} : images[pair.b - n];
+  };
+  const auto rows_end = std::ranges::lower_bound(pairs, n, {}, &SpherePair::a);
   std::vector<PeriodicContact> result;
-  for (SphereContact c : collider.find_contacts(reduced.spheres)) {
-    if (c.a >= n) break;
-    ImageShift shift{};
-    if (c.b >= n) {
-      const detail::PeriodicImage& image = images[c.b - n];
-      if (image.sphere <= c.a) continue;  // listed as an image of the sphere with the higher index
-      c.b = image.sphere;
-      shift = detail::shift_of(image.code);
+  result.reserve(static_cast<std::size_t>(rows_end - pairs.begin()));
+  const auto add = [&](SphereIndex a, const detail::PeriodicImage& image) {
+    const SphereIndex b = image.sphere;
+    if (b <= a) return;  // listed with the sphere of the higher index
+    // A pair that touches through two images is listed with the lower shift.
+    const bool is_listed =
+        !result.empty() && result.back().contact.a == a && result.back().contact.b == b;
+    if (is_listed) return;
+    ImageShift shift = detail::shift_of(image.code);
+    for (std::size_t k = 0; k < 3; ++k) shift[k] += reduced.cells[a][k] - reduced.cells[b][k];
+    const PairResult found = detail::touch_at(spheres[a], spheres[b], shift, cell);
+    if (found.touching != 0) result.push_back({{a, b, found.normal, found.distance}, shift});
+  };
+  for (const SpherePair* row = pairs.data(); row != pairs.data() + pairs.size() && row->a < n;) {
+    const SphereIndex a = row->a;
+    const SpherePair *sphere = row, *image = row;
+    const auto is_in_row = [&](const SpherePair* at) {
+      return at != pairs.data() + pairs.size() && at->a == a;
+    };
+    while (is_in_row(image) && image->b < n) ++image;
+    const SpherePair* const first_image = image;
+    while (sphere != first_image || is_in_row(image)) {
+      const bool takes_sphere =
+          sphere != first_image &&
+          (!is_in_row(image) || is_before(image_at(*sphere), image_at(*image)));
+      add(a, image_at(*(takes_sphere ? sphere++ : image++)));
     }
-    for (std::size_t k = 0; k < 3; ++k) {
-      shift[k] += reduced.cells[c.a][k] - reduced.cells[c.b][k];
-    }
-    result.push_back({c, shift});
+    row = image;
   }
-  const auto key = [](const PeriodicContact& c) {
-    return std::tuple(c.contact.a, c.contact.b, c.shift);
-  };
-  std::sort(result.begin(), result.end(),
-            [&](const auto& p, const auto& q) { return key(p) < key(q); });
-  const auto same_pair = [](const PeriodicContact& p, const PeriodicContact& q) {
-    return p.contact.a == q.contact.a && p.contact.b == q.contact.b;
-  };
-  result.erase(std::unique(result.begin(), result.end(), same_pair), result.end());
   return result;
 }
 

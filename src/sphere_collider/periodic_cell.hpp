@@ -3,6 +3,8 @@
 
 #include <jfpx/periodic.hpp>
 
+#include "src/collide/sphere_pair.hpp"
+
 #include <cmath>
 #include <limits>
 
@@ -51,62 +53,78 @@ JFPX_HD inline bool is_reducible(const Vec3& centre, const PeriodicCell& cell) {
   return result;
 }
 
-/// Reduces one coordinate to [0, length), and returns the number of cells that it was displaced by.
+/// Reduces one coordinate to [-length/2, length/2), and returns the number of cells that it was
+/// displaced by. A coordinate in this range does not change.
 JFPX_HD inline std::int32_t reduce(Real* x, Real length) {
+  const Real half = length / 2;
+  if (*x >= -half && *x < half) return 0;
 #if defined(__CUDA_ARCH__)
-  const Real cells = ::floor(*x / length);
+  const Real cells = ::floor(*x / length + Real(0.5));
 #else
-  const Real cells = std::floor(*x / length);
+  const Real cells = std::floor(*x / length + Real(0.5));
 #endif
   *x -= cells * length;
   auto count = static_cast<std::int32_t>(cells);
   // The quotient and the difference are rounded.
-  if (*x < 0) {
+  if (*x < -half) {
     *x += length;
     --count;
   }
-  if (*x >= length) {
+  if (*x >= half) {
     *x -= length;
     ++count;
   }
   return count;
 }
-/// The same along all axes that repeat, for a centre that is_reducible().
-JFPX_HD inline ImageShift reduce(Vec3* centre, const PeriodicCell& cell) {
-  ImageShift cells{};
+
+/// A sphere in the cell whose radius covers the rounding of the reduction: if two spheres touch by
+/// touch_at(), their reduced spheres or images touch. A coordinate that is displaced has an error
+/// of at most epsilon (|x| + 4 lengths) / 2. The factor covers the roundings of both tests.
+/// @param cells receives the displacements along the axes that repeat
+/// @param sphere its centre is_reducible()
+JFPX_HD inline SphereInstance reduced(SphereInstance sphere, const PeriodicCell& cell,
+                                      ImageShift* cells) {
+  *cells = {};
+  Real error = 0;
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
-    if (cell.repeats[axis]) cells[axis] = reduce(&(*centre)[k], cell.lengths[k]);
+    if (!cell.repeats[axis]) continue;
+    const Real given = absolute(sphere.centre[k]), length = cell.lengths[k];
+    (*cells)[axis] = reduce(&sphere.centre[k], length);
+    if ((*cells)[axis] != 0) error += (given + 4 * length) * kEpsilon;
   }
-  return cells;
+  sphere.radius = (sphere.radius + error) * (1 + 16 * kEpsilon);
+  return sphere;
 }
 
 JFPX_HD inline Real image_coordinate(Real x, std::int32_t shift, Real length) {
   return shift == 0 ? x : x + static_cast<Real>(shift) * length;
 }
+/// An image of a reduced() sphere. Its radius also covers the rounding of the image.
 JFPX_HD inline SphereInstance image_of(SphereInstance sphere, const ImageShift& shift,
                                        const PeriodicCell& cell) {
   for (int k = 0; k < 3; ++k) {
+    const std::int32_t displacement = shift[static_cast<std::size_t>(k)];
+    if (displacement == 0) continue;
     Real& x = sphere.centre[k];
-    x = image_coordinate(x, shift[static_cast<std::size_t>(k)], cell.lengths[k]);
+    x = image_coordinate(x, displacement, cell.lengths[k]);
+    sphere.radius += cell.lengths[k] * (2 * kEpsilon);
   }
   return sphere;
 }
 
-/// Bit `code` is set for each image whose centre is at most `reach` outside the cell, which is at
-/// most half a length. The margin is wider by 8 epsilon lengths. Touching centres are at most
-/// reach * (1 + 5 epsilon) apart, because the sum of two radii and the distance are rounded; that
-/// is 2.5 epsilon lengths more than `reach`, and the margin and its sum with a length lose less
-/// than 2 by rounding.
+/// Bit `code` is set for each image whose centre is at most `reach` outside the cell. The margin is
+/// wider by 8 epsilon lengths, which covers the roundings of the image and of the comparison.
+/// @param reach the largest sum of the radii of two reduced() spheres
 JFPX_HD inline std::uint32_t near_images(const Vec3& centre, const PeriodicCell& cell, Real reach) {
   std::uint32_t codes = 1;
   for (int k = 0; k < 3; ++k) {
     std::uint32_t near = 2;  // bits of the shifts -1, 0 and 1
     if (cell.repeats[static_cast<std::size_t>(k)]) {
       const Real length = cell.lengths[k];
-      const Real margin = reach + length * (8 * kEpsilon);
-      if (image_coordinate(centre[k], -1, length) >= -margin) near |= 1;
-      if (image_coordinate(centre[k], 1, length) <= length + margin) near |= 4;
+      const Real limit = length / 2 + reach + length * (8 * kEpsilon);
+      if (image_coordinate(centre[k], -1, length) >= -limit) near |= 1;
+      if (image_coordinate(centre[k], 1, length) <= limit) near |= 4;
     }
     // Each bit of the axes before becomes the three bits of this one.
     std::uint32_t product = 0;
@@ -114,6 +132,43 @@ JFPX_HD inline std::uint32_t near_images(const Vec3& centre, const PeriodicCell&
     codes = product;
   }
   return codes & ~(1u << kNoShift);
+}
+
+/// The sum of x and y, whose rounding error is added to *error (Knuth 1969).
+JFPX_HD inline double sum_with_error(double x, double y, double* error) {
+  const double sum = x + y, of_y = sum - x;
+  *error += (x - (sum - of_y)) + (y - of_y);
+  return sum;
+}
+/// a - (b + shift * length), as if it were rounded once, apart from errors of 2^-100 of the terms.
+JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real length) {
+  if (shift == 0) return a - b;
+  // Both products are exact: the upper part of the length has 27 bits, and a shift has at most 22
+  // (Dekker 1971).
+  const bool is_large = static_cast<double>(length) > 0x1p900;
+  const double scaled = static_cast<double>(length) * (is_large ? 0x1p-100 : 1);
+  const double product = scaled * ((1 << 26) + 1), rounded = product - (product - scaled);
+  const double upper = rounded * (is_large ? 0x1p100 : 1);
+  double error = 0;
+  double sum = sum_with_error(a, -static_cast<double>(b), &error);
+  sum = sum_with_error(sum, -static_cast<double>(shift) * upper, &error);
+  sum = sum_with_error(sum, -static_cast<double>(shift) * (static_cast<double>(length) - upper),
+                       &error);
+  return static_cast<Real>(sum + error);
+}
+
+/// Tests a sphere with the image of another one, from the given centres: the difference of the
+/// centres is computed before the image, so that neither the size of the cell nor the reduction
+/// affects the result. Without a shift, it is that of test_sphere_pair().
+JFPX_HD inline PairResult touch_at(const SphereInstance& a, const SphereInstance& b,
+                                   const ImageShift& shift, const PeriodicCell& cell) {
+  SphereInstance relative{{}, a.radius};
+  for (int k = 0; k < 3; ++k) {
+    const std::int32_t displacement = shift[static_cast<std::size_t>(k)];
+    const Real length = displacement == 0 ? Real(0) : cell.lengths[k];
+    relative.centre[k] = image_difference(a.centre[k], b.centre[k], displacement, length);
+  }
+  return test_sphere_pair(relative, {{}, b.radius});
 }
 
 }  // namespace detail

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 namespace jfpx {
@@ -79,7 +80,8 @@ TEST(Periodic, ContactsAreThoseOfTheNearestImages) {
     ASSERT_TRUE(std::is_sorted(found.begin(), found.end(), [](const auto& p, const auto& q) {
       return std::pair(p.contact.a, p.contact.b) < std::pair(q.contact.a, q.contact.b);
     }));
-    const long double error = 64 * static_cast<long double>(kEpsilon) * 7;
+    // Of the difference of the centres, of its length and of the gap.
+    const long double error = 4 * static_cast<long double>(kEpsilon) * Real(2.2);
     std::size_t shifted = 0;
     for (const Expected& e : nearest_images(spheres, cell)) {
       if (std::abs(e.gap) <= error) continue;  // rounding decides
@@ -95,6 +97,65 @@ TEST(Periodic, ContactsAreThoseOfTheNearestImages) {
     }
     EXPECT_GT(shifted, 100u);
   }
+}
+
+/// The contacts of spheres that no image touches are those of an open search, in cells of any size.
+TEST(Periodic, WithoutImagesTheBitsAreThoseOfAnOpenSearch) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  Spheres spheres(400);
+  for (SphereInstance& s : spheres) {
+    s = {random.uniform_in_box({-10, -10, -10}, {10, 10, 10}), random.uniform(Real(0.5), 1)};
+  }
+  const std::span open = collider->find_contacts(spheres);
+  const std::vector<SphereContact> expected(open.begin(), open.end());
+  ASSERT_GT(expected.size(), 100u);
+  for (const Real length : {Real(30), Real(1e3), Real(1e5), Real(1e7), Real(3e9), Real(1e12)}) {
+    const PeriodicCell cell{{length, length, length}};
+    std::vector<SphereContact> found;
+    for (const PeriodicContact& c : find_periodic_contacts(*collider, spheres, cell)) {
+      EXPECT_EQ(c.shift, ImageShift{});
+      found.push_back(c.contact);
+    }
+    EXPECT_EQ(found, expected) << length << ", " << seed_note();
+  }
+}
+
+/// Spheres at the boundaries of large cells, some of them many cells away: the distances are those
+/// of the given centres, which are far less precise than the radii are.
+TEST(Periodic, DistancesInLargeCellsAreThoseOfTheGivenCentres) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  std::size_t touching = 0;
+  for (int k = 0; k < 60; ++k) {
+    const Real length = std::exp2(random.uniform(3, 40));
+    const PeriodicCell cell{{length, length * Real(1.3), length * Real(0.7)}};
+    Spheres spheres(60);
+    for (SphereInstance& s : spheres) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto cells = static_cast<Real>(random.below(5)) - 2;
+        const Real half = cell.lengths[axis] / 2;
+        s.centre[axis] = (random.below(3) == 0 ? Real(0) : cells * half) + random.uniform(-1, 1);
+      }
+      s.radius = random.uniform(Real(0.1), Real(0.6));
+    }
+    std::map<std::pair<SphereIndex, SphereIndex>, PeriodicContact> by_pair;
+    for (const PeriodicContact& c : find_periodic_contacts(*collider, spheres, cell)) {
+      by_pair[{c.contact.a, c.contact.b}] = c;
+    }
+    for (const Expected& e : nearest_images(spheres, cell)) {
+      const long double error = 8 * static_cast<long double>(kEpsilon);
+      if (std::abs(e.gap) <= error) continue;  // rounding decides
+      const auto at = by_pair.find(e.pair);
+      ASSERT_EQ(at != by_pair.end(), e.gap < 0) << length << ", " << seed_note();
+      if (at == by_pair.end()) continue;
+      ++touching;
+      EXPECT_NEAR(static_cast<double>(at->second.contact.distance), static_cast<double>(e.gap),
+                  static_cast<double>(error))
+          << length << ", " << seed_note();
+    }
+  }
+  EXPECT_GT(touching, 500u);
 }
 
 TEST(Periodic, BetweenTwoSetsAreTheContactsOfBothAmongThoseOfAll) {

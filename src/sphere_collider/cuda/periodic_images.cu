@@ -28,10 +28,11 @@ __global__ void __launch_bounds__(kListThreads)
   std::uint32_t has_bad = 0;
   for (std::size_t i = first_element(); i < args.n; i += element_stride()) {
     SphereInstance sphere = load_sphere(spheres + i);
+    args.given[i].sphere = sphere;
     const PeriodicCell& cell = cell_of(args, i);
     if (is_valid(sphere) && detail::fits(cell, sphere.radius) &&
         detail::is_reducible(sphere.centre, cell)) {
-      args.displacements[i] = detail::reduce(&sphere.centre, cell);
+      sphere = detail::reduced(sphere, cell, &args.given[i].displacement);
       largest = max(largest, sphere.radius);
     } else {
       has_bad = 1;
@@ -92,28 +93,67 @@ __device__ std::size_t items_before_from(const Item* items, std::size_t begin, s
   return low + items_before(items + low, high - low, a, b);
 }
 
+/// The sphere b of an item of row a, or the sphere that b is an image of, and the code of its
+/// shift.
+__device__ PeriodicImage image_at(const PeriodicArgs& args, std::uint32_t b) {
+  return b < args.n ? PeriodicImage{b, detail::kNoShift} : args.images[b - args.n];
+}
+
+/// The shift between the given centres of two spheres whose reduced ones have a shift.
+__device__ ImageShift shift_between(const ImageShift& displacement_a,
+                                    const ImageShift& displacement_b, std::uint32_t code) {
+  ImageShift shift = detail::shift_of(code);
+  for (std::size_t k = 0; k < 3; ++k) shift[k] += displacement_a[k] - displacement_b[k];
+  return shift;
+}
+
+/// The exact test of a pair whose reduced spheres or images touch.
 template <class Item>
-__device__ bool is_kept(const PeriodicArgs& args, const Item* items, std::size_t n, std::size_t i) {
-  const std::uint32_t a = items[i].a, b = items[i].b;
+__device__ PairResult touch_of(const PeriodicArgs& args, const Item& item) {
+  const PeriodicImage image = image_at(args, item.b);
+  const DisplacedSphere &a = args.given[item.a], &b = args.given[image.sphere];
+  return detail::touch_at(load_sphere(&a.sphere), load_sphere(&b.sphere),
+                          shift_between(a.displacement, b.displacement, image.code),
+                          cell_of(args, item.a));
+}
+
+template <class Item>
+__device__ bool is_kept(const PeriodicArgs& args, Item* items, std::size_t n, std::size_t i) {
+  const std::uint32_t a = items[i].a;
   if (a >= args.n) return false;
-  if (b < args.n) {  // unless an image of b has a lower shift
-    const std::uint64_t first = args.n + args.begins[b], last = args.n + args.begins[b + 1];
-    const std::size_t j = items_before_from(items, i, n, a, first);
-    return j == n || items[j].a != a || items[j].b >= last ||
-           args.images[items[j].b - args.n].code > detail::kNoShift;
+  const PeriodicImage b = image_at(args, items[i].b);
+  if (b.sphere <= a) return false;  // an image of a touches the sphere with the higher index
+  const PairResult found = touch_of(args, items[i]);
+  if (found.touching == 0) return false;
+  if constexpr (std::is_same_v<Item, SphereContact>) {
+    items[i].normal = found.normal;
+    items[i].distance = found.distance;
   }
-  const PeriodicImage image = args.images[b - args.n];
-  if (image.sphere <= a) return false;  // an image of a touches the sphere with the higher index
-  const std::uint64_t first = args.n + args.begins[image.sphere];
-  if (i > 0 && items[i - 1].a == a && items[i - 1].b >= first) return false;
-  if (image.code < detail::kNoShift) return true;
-  const std::size_t j = items_before(items, n, a, image.sphere);
-  return items[j].a != a || items[j].b != image.sphere;  // j <= i
+  // Unless another image of b with a lower shift touches.
+  if (b.code > detail::kNoShift) {
+    const std::size_t j = items_before(items, n, a, b.sphere);  // j <= i
+    if (items[j].a == a && items[j].b == b.sphere && touch_of(args, items[j]).touching != 0) {
+      return false;
+    }
+  }
+  const std::uint64_t first = args.n + args.begins[b.sphere];
+  const std::uint64_t last = args.n + args.begins[b.sphere + 1];
+  std::size_t j = i;
+  if (items[i].b < args.n) {
+    j = items_before_from(items, i, n, a, first);
+  } else {
+    while (j > 0 && items[j - 1].a == a && items[j - 1].b >= first) --j;
+  }
+  for (; j < n && items[j].a == a && items[j].b < last; ++j) {
+    if (args.images[items[j].b - args.n].code >= b.code) break;
+    if (touch_of(args, items[j]).touching != 0) return false;
+  }
+  return true;
 }
 
 template <class Item>
 __global__ void __launch_bounds__(kListThreads)
-    mark_kept(PeriodicArgs args, const Item* items, std::size_t n, std::uint32_t* kept) {
+    mark_kept(PeriodicArgs args, Item* items, std::size_t n, std::uint32_t* kept) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
     kept[i] = is_kept(args, items, n, i) ? 1 : 0;
@@ -133,23 +173,20 @@ __global__ void __launch_bounds__(kListThreads)
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
     if (kept[i] == 0) continue;
     Item item = items[i];
+    const PeriodicImage image = image_at(args, item.b);
     std::size_t images, other;  // first image of the row; first item of the other part beyond b
-    std::uint32_t code = detail::kNoShift;
     if (item.b < args.n) {
       images = items_before_from(items, i, n, item.a, args.n);
       other = items_before_from(items, images, n, item.a, args.n + args.begins[item.b]);
     } else {
-      const PeriodicImage image = args.images[item.b - args.n];
       item.b = image.sphere;
-      code = image.code;
       other = items_before(items, n, item.a, item.b);
       images = items_before_from(items, other, n, item.a, args.n);
     }
     const unsigned long long at = places[i] + places[other] - places[images];
     out[at] = item;
-    const ImageShift shift = detail::shift_of(code), a = args.displacements[item.a],
-                     b = args.displacements[item.b];
-    for (std::size_t k = 0; k < 3; ++k) shifts[at][k] = shift[k] + a[k] - b[k];
+    shifts[at] =
+        shift_between(args.given[item.a].displacement, args.given[item.b].displacement, image.code);
   }
 }
 
@@ -182,8 +219,8 @@ void launch_append_images(const PeriodicArgs& args, SphereInstance* spheres, cud
 }
 
 template <class Item>
-void launch_mark_kept(const PeriodicArgs& args, const Item* items, std::size_t n,
-                      std::uint32_t* kept, cudaStream_t stream) {
+void launch_mark_kept(const PeriodicArgs& args, Item* items, std::size_t n, std::uint32_t* kept,
+                      cudaStream_t stream) {
   launch(mark_kept<Item>, list_blocks(n), 1, kListThreads, stream, args, items, n, kept);
 }
 
@@ -204,13 +241,13 @@ void launch_write_shifts(const FoundItems<Item>& found, const FoundItems<Item>& 
          half_shifts, shifts, capacity);
 }
 
-#define JFPX_INSTANTIATE(Item)                                                                  \
-  template void launch_mark_kept(const PeriodicArgs&, const Item*, std::size_t, std::uint32_t*, \
-                                 cudaStream_t);                                                 \
-  template void launch_place_kept(const PeriodicArgs&, const Item*, std::size_t,                \
-                                  const std::uint32_t*, const unsigned long long*, Item*,       \
-                                  ImageShift*, ContactCount*, cudaStream_t);                    \
-  template void launch_write_shifts(const FoundItems<Item>&, const FoundItems<Item>&,           \
+#define JFPX_INSTANTIATE(Item)                                                            \
+  template void launch_mark_kept(const PeriodicArgs&, Item*, std::size_t, std::uint32_t*, \
+                                 cudaStream_t);                                           \
+  template void launch_place_kept(const PeriodicArgs&, const Item*, std::size_t,          \
+                                  const std::uint32_t*, const unsigned long long*, Item*, \
+                                  ImageShift*, ContactCount*, cudaStream_t);              \
+  template void launch_write_shifts(const FoundItems<Item>&, const FoundItems<Item>&,     \
                                     const ImageShift*, std::int32_t*, std::size_t, cudaStream_t);
 JFPX_INSTANTIATE(SpherePair)
 JFPX_INSTANTIATE(SphereContact)

@@ -16,8 +16,15 @@ using detail::PeriodicImage;
 
 /// Properties of all spheres. All bytes are zero before launch_reduce().
 struct PeriodicState {
-  unsigned long long largest_radius;  ///< bits of the largest valid radius
+  unsigned long long largest_radius;  ///< bits of the largest radius of `reduced`
   unsigned long long has_bad;  ///< 1: a sphere is invalid, too large for its cell or too far away
+};
+
+/// A given sphere, and the cells that its reduced one was displaced by. In float, one memory
+/// sector.
+struct alignas(32) DisplacedSphere {
+  SphereInstance sphere;
+  ImageShift displacement;
 };
 
 /// Arrays in device memory.
@@ -27,14 +34,14 @@ struct PeriodicArgs {
   const std::uint64_t* offsets;  ///< [systems + 1] first spheres of the systems
   std::uint32_t systems;
   std::uint32_t n;
-  SphereInstance* reduced;           ///< [n]
-  ImageShift* displacements;         ///< [n] cells that the spheres were displaced by
+  DisplacedSphere* given;            ///< [n]
+  SphereInstance* reduced;           ///< [n] by detail::reduced()
   std::uint32_t* counts;             ///< [n + 1] numbers of images, and a 0
   const unsigned long long* begins;  ///< [n + 1] exclusive scan of `counts`
   PeriodicImage* images;             ///< [begins[n]]
   PeriodicState* state;
 };
-/// Enqueues `reduced`, `displacements` and `state`.
+/// Enqueues `given`, `reduced` and `state`.
 void launch_reduce(const PeriodicArgs& args, const SphereInstance* spheres, cudaStream_t stream);
 /// Enqueues `counts`.
 void launch_count_images(const PeriodicArgs& args, cudaStream_t stream);
@@ -42,12 +49,13 @@ void launch_count_images(const PeriodicArgs& args, cudaStream_t stream);
 void launch_append_images(const PeriodicArgs& args, SphereInstance* spheres, cudaStream_t stream);
 
 /// Enqueues kept[i] = 1 for each item that is a pair of two spheres a < b, or of a sphere a and an
-/// image of a sphere b > a, and has the lowest shift of all such items of (a, b); else 0.
-/// @param items [n] sorted pairs among the spheres and the images
+/// image of a sphere b > a, that touch by detail::touch_at(), and has the lowest shift of all such
+/// items of (a, b); else 0. Replaces the normals and distances of the kept items by the exact ones.
+/// @param items [n] sorted pairs among the reduced spheres and their images
 /// @param kept [n + 1], of which the last is 0
 template <class Item>
-void launch_mark_kept(const PeriodicArgs& args, const Item* items, std::size_t n,
-                      std::uint32_t* kept, cudaStream_t stream);
+void launch_mark_kept(const PeriodicArgs& args, Item* items, std::size_t n, std::uint32_t* kept,
+                      cudaStream_t stream);
 /// Enqueues the kept items, sorted by (a, b), with their shifts and their number.
 /// @param places [n + 1] exclusive scan of `kept`
 template <class Item>

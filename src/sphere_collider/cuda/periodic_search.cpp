@@ -18,15 +18,15 @@ void PeriodicSearch::enqueue_scan(const std::uint32_t* values, unsigned long lon
 }
 
 bool PeriodicSearch::count(const SphereInstance* spheres, std::size_t n) {
+  given_.reserve_geometric(pool_, stream_, n, "spheres");
   reduced_.reserve_geometric(pool_, stream_, n, "reduced spheres");
-  displacements_.reserve_geometric(pool_, stream_, n, "periodic cells of spheres");
   counts_.reserve_geometric(pool_, stream_, n + 1, "numbers of images");
   begins_.reserve_geometric(pool_, stream_, n + 1, "sums of numbers of images");
   state_.reserve(pool_, stream_, 1, "states of searches");
   totals_.reserve(1, "numbers of images");
   args_.n = static_cast<std::uint32_t>(n);
+  args_.given = given_.data();
   args_.reduced = reduced_.data();
-  args_.displacements = displacements_.data();
   args_.counts = counts_.data();
   args_.begins = begins_.data();
   args_.state = state_.data();
@@ -100,7 +100,7 @@ void PeriodicSearch::append_images(SphereInstance* spheres) {
 }
 
 template <class Item>
-void PeriodicSearch::keep_nearest(const Item* items, std::size_t found, DeviceBuffer<Item>* out,
+void PeriodicSearch::keep_nearest(Item* items, std::size_t found, DeviceBuffer<Item>* out,
                                   ContactCount* count) {
   kept_.reserve_geometric(pool_, stream_, found + 1, "marks of contacts");
   places_.reserve_geometric(pool_, stream_, found + 1, "places of contacts");
@@ -111,9 +111,9 @@ void PeriodicSearch::keep_nearest(const Item* items, std::size_t found, DeviceBu
   launch_place_kept(args_, items, found, kept_.data(), places_.data(), out->data(), shifts_.data(),
                     count, stream_);
 }
-template void PeriodicSearch::keep_nearest(const SpherePair*, std::size_t,
-                                           DeviceBuffer<SpherePair>*, ContactCount*);
-template void PeriodicSearch::keep_nearest(const SphereContact*, std::size_t,
+template void PeriodicSearch::keep_nearest(SpherePair*, std::size_t, DeviceBuffer<SpherePair>*,
+                                           ContactCount*);
+template void PeriodicSearch::keep_nearest(SphereContact*, std::size_t,
                                            DeviceBuffer<SphereContact>*, ContactCount*);
 
 }  // namespace cuda

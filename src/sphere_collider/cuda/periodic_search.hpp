@@ -30,10 +30,9 @@ class PeriodicSearch {
   /// Enqueues the n reduced spheres and the images that were counted.
   void append_images(SphereInstance* spheres);
   /// Enqueues the pairs of nearest images, and their number.
-  /// @param items [found] sorted pairs among the spheres and the images
+  /// @param items [found] sorted pairs among the reduced spheres and their images; changes
   template <class Item>
-  void keep_nearest(const Item* items, std::size_t found, DeviceBuffer<Item>* out,
-                    ContactCount* count);
+  void keep_nearest(Item* items, std::size_t found, DeviceBuffer<Item>* out, ContactCount* count);
 
   /// [n + 1]: the images of sphere i are from n + image_begins[i] to n + image_begins[i + 1].
   const unsigned long long* image_begins() const noexcept { return begins_.data(); }
@@ -56,9 +55,10 @@ class PeriodicSearch {
   const MemoryPool& pool_;
   cudaStream_t stream_;
   PeriodicArgs args_{};
+  DeviceBuffer<DisplacedSphere> given_;
   DeviceBuffer<SphereInstance> reduced_;
   DeviceBuffer<PeriodicCell> cells_;
-  DeviceBuffer<ImageShift> displacements_, shifts_;
+  DeviceBuffer<ImageShift> shifts_;
   DeviceBuffer<std::uint32_t> counts_, kept_;
   DeviceBuffer<unsigned long long> begins_, places_;
   DeviceBuffer<PeriodicImage> images_;

@@ -91,6 +91,35 @@ TEST_F(Cuda, FewArraysInAPeriodicCellHaveTheContactsOfTheHost) {
   }
 }
 
+/// Cells that are so large that the reduction to the cell and the images are inexact.
+TEST_F(Cuda, FewArraysInALargePeriodicCellHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  const OwnedStream stream(0);
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  for (const Real length : {Real(100), Real(1e4), Real(1e6), Real(1e8), Real(1e11)}) {
+    const PeriodicCell cell{{length, length * Real(1.3), length * Real(0.7)}};
+    Spheres spheres(500);
+    for (SphereInstance& s : spheres) {
+      for (int k = 0; k < 3; ++k) {
+        const auto halves = static_cast<Real>(random.below(5)) - 2;
+        const Real start = random.below(3) == 0 ? 0 : halves * cell.lengths[k] / 2;
+        s.centre[k] = start + random.uniform(-1, 1);
+      }
+      s.radius = random.uniform(Real(0.1), Real(0.6));
+    }
+    const DeviceSpheres arrays(spheres);
+    const auto expected = find_periodic_contacts(*cpu, spheres, cell);
+    ASSERT_GT(expected.size(), 100u);
+    ASSERT_EQ(
+        collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
+        expected.size())
+        << length << ", " << seed_note();
+    EXPECT_EQ(periodic_of(collider, expected.size(), stream.get()), expected)
+        << length << ", " << seed_note();
+  }
+}
+
 TEST_F(Cuda, ArraysInAPeriodicCellUseTheGridWithTheSameBits) {
   Random random(base_seed());
   const OwnedStream stream(0);
