@@ -31,9 +31,10 @@ struct PeriodicContact {
 
 /// Finds the touching pairs of spheres and images of spheres (minimum image convention), sorted by
 /// (a, b), a < b. A pair that touches through two images, which are half a length apart, is listed
-/// once, with the lower shift. Contacts are computed from the given centres: a - b - shift * lengths is
-/// rounded once per axis, then the contact is that of SphereCollider. So pairs without a shift have
-/// the bits of an open search, whatever the lengths are. The bits do not depend on the collider.
+/// once, with the lower shift. Contacts are computed from the given centres: a - b - shift *
+/// lengths is rounded once per axis, then the contact is that of SphereCollider. So pairs without a
+/// shift have the bits of an open search, whatever the lengths are. The bits do not depend on the
+/// collider.
 /// @throws InvalidArgument like SphereCollider::find_contacts(); for a length that is not > 0,
 ///   exceeds half of the largest number, or is less than four times the largest radius; for a
 ///   centre that is 2^20 lengths or more from the origin. std::bad_alloc
