@@ -160,6 +160,9 @@ class JFPX_API World {
   const Shape& shape(BodyId id) const;
   /// States in the order of bodies().
   std::vector<BodyState> states() const;
+  /// The same into a vector whose memory is reused, with all threads of the world: faster for many
+  /// bodies in every step. @param states receives the states
+  void states(std::vector<BodyState>* states) const;
   /// @throws InvalidArgument for an unknown id
   BodyState state(BodyId id) const;
   /// Replaces the state of motion, and wakes the body and the bodies in contact with it. An

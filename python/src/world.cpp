@@ -70,7 +70,8 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
       .def("write_states",
            [](const PythonWorld& self, const Rows<Real>& positions, const Rows<Real>& orientations,
               const Rows<Real>& velocities, const Rows<Real>& angular_velocities) {
-             fill({positions, orientations, velocities, angular_velocities}, self.get().states());
+             self.get().states(&self.copied_states);
+             fill({positions, orientations, velocities, angular_velocities}, self.copied_states);
            })
       .def("set_states",
            [](PythonWorld& self, const Rows<const Real>& positions,

@@ -47,6 +47,9 @@ class PythonWorld {
     return scene;
   }
 
+  mutable std::vector<BodyState>
+      copied_states;  ///< buffer for copies of states, under the global lock
+
   /// One step without Python's global lock.
   StepReport step();
   /// Up to `steps` steps, and fewer if one is undone. Between steps, handles signals of Python.

@@ -21,7 +21,7 @@ class NativeRun final : public Run {
   RunState run_state() override {
     RunState run_state;
     run_state.step = first_step_ + report_.step;
-    run_state.states = world_.states();
+    world_.states(&run_state.states);
     for (const BodyId id : world_.bodies()) run_state.awake.push_back(world_.awake(id) ? 1 : 0);
     run_state.contacts.assign(world_.contacts().begin(), world_.contacts().end());
     run_state.times = tool::stage_times(report_);

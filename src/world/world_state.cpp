@@ -1,6 +1,7 @@
 /// Access to a World between two steps: bodies, states, forces and contact generators.
 #include <jfpx/error.hpp>
 
+#include "src/base/parallel_for.hpp"
 #include "src/scene/field_fault.hpp"
 #include "src/world/world_impl.hpp"
 
@@ -41,11 +42,23 @@ BodyId World::body_at(std::uint32_t index) const {
 const Shape& World::shape(BodyId id) const { return impl_->store.shape(impl_->store.require(id)); }
 
 std::vector<BodyState> World::states() const {
-  std::vector<BodyState> states;
-  states.reserve(bodies().size());
+  std::vector<BodyState> result;
+  states(&result);
+  return result;
+}
+
+void World::states(std::vector<BodyState>* states) const {
+  constexpr std::size_t kBodiesPerTask = 4096;
   const BodyStore& store = impl_->bodies_with_states();
-  for (const BodyId id : bodies()) states.push_back(store.state(id.index));
-  return states;
+  const std::span<const BodyId> ids = bodies();
+  states->resize(ids.size());
+  const std::lock_guard lock(impl_->fetching);  // the pool runs one loop at a time
+  parallel_for(impl_->pool.get(), ids.size(), kBodiesPerTask,
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t i = first; i < last; ++i) {
+                   (*states)[i] = store.state(ids[i].index);
+                 }
+               });
 }
 
 BodyState World::state(BodyId id) const {

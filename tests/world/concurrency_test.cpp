@@ -34,7 +34,7 @@ struct Results {
 Results query(const World& world) {
   Results results;
   results.hash = world.state_hash();
-  results.states = world.states();
+  world.states(&results.states);
   results.hits = world.cast_ray_through({.origin = {-9, 0, 0}, .direction = {1, 0, 0}});
   results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
   results.contacts.assign(world.contacts().begin(), world.contacts().end());

@@ -58,6 +58,24 @@ TEST(World, StartsInTheStateOfTheScene) {
   EXPECT_EQ(world.state(world.bodies()[1]), states[1]);
 }
 
+TEST(World, StatesAreWrittenToMemoryThatIsKept) {
+  Scene scene;
+  for (int i = 0; i < 10000; ++i) {
+    scene.bodies.push_back(test::ball({Real(2.5) * static_cast<Real>(i), 0, 0}));
+  }
+  World world(scene, {.threads = 3});
+  std::vector<BodyState> states;
+  world.states(&states);
+  const BodyState* const memory = states.data();
+  world.step();
+  world.states(&states);
+  EXPECT_EQ(states, world.states());
+  world.remove(world.bodies()[3]);
+  world.states(&states);
+  EXPECT_EQ(states, world.states());
+  EXPECT_EQ(states.data(), memory);
+}
+
 TEST(World, ReportsWhatAStepDid) {
   for (const Solver solver : test::kSolvers) {
     SCOPED_TRACE(to_string(solver));
