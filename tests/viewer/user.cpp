@@ -94,11 +94,16 @@ void User::choose(const std::string& list, const std::string& entry) {
   const auto before = log_.widgets;
   click(list);
   frame();  // Dear ImGui sizes the list in its first frame
-  const auto is_new = [&before](const auto& widget) { return !before.contains(widget.first); };
   for (int i = 0; i < 20 && !sees(entry); ++i) {
-    const auto seen = std::find_if(log_.widgets.begin(), log_.widgets.end(), is_new);
-    if (seen == log_.widgets.end()) break;
-    move_to(seen->second.left + 4, seen->second.top + 4);
+    std::vector<view::PanelLog::Widget> entries;
+    for (const auto& [label, widget] : log_.widgets) {
+      if (!before.contains(label)) entries.push_back(widget);
+    }
+    if (entries.empty()) break;
+    // The first and the last entry may be outside of the list for the most part.
+    const auto middle = entries.begin() + static_cast<std::ptrdiff_t>(entries.size() / 2);
+    std::ranges::nth_element(entries, middle, {}, &view::PanelLog::Widget::top);
+    move_to(middle->left + 4, (middle->top + middle->bottom) / 2);
     SDL_Event event{};
     event.type = SDL_MOUSEWHEEL;
     event.wheel.y = -1;

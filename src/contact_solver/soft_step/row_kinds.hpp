@@ -51,11 +51,14 @@ JFPX_HD constexpr RowKind kind_of_joint(std::uint32_t type) {
 template <class Row>
 inline constexpr bool kHasParts = !std::is_same_v<typename Row::Part, NoPart>;
 
-/// Calls f(std::type_identity<Row>()) for the type of a kind.
-template <RowKind kFirst = 0, class F>
+/// Number of kinds of rows of contacts, which precede those of joints.
+inline constexpr RowKind kContactRowKinds = kind_of_joint(0);
+
+/// Calls f(std::type_identity<Row>()) for the type of a kind in [kFirst, kEnd).
+template <RowKind kFirst = 0, RowKind kEnd = kRowKinds, class F>
 JFPX_HD constexpr decltype(auto) visit_row(RowKind kind, const F& f) {
-  if constexpr (kFirst + 1u < kRowKinds) {
-    if (kind != kFirst) return visit_row<kFirst + 1>(kind, f);
+  if constexpr (kFirst + 1u < kEnd) {
+    if (kind != kFirst) return visit_row<kFirst + 1, kEnd>(kind, f);
   }
   return f(std::type_identity<std::tuple_element_t<kFirst, RowTypes>>());
 }

@@ -246,7 +246,8 @@ class CudaDevice {
   std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,
              Limits<device::SphereProgram>, Limits<device::ShapeProgram>,
              Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
-             Limits<device::SolveProgram>, Limits<device::CommitProgram>,
+             Limits<device::SolveProgram<soft_step::kContactRowKinds>>,
+             Limits<device::SolveProgram<soft_step::kRowKinds>>, Limits<device::CommitProgram>,
              Limits<device::EditProgram>, Limits<device::MergeProgram>>
       limits_;
 };

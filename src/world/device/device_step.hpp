@@ -412,7 +412,11 @@ class DeviceStep final : public DeviceWorld {
     device_->run(MatchProgram{d}, contacts);
     mark(2);
     device_->run(PrepareProgram{d}, contacts);
-    device_->run(SolveProgram{d}, contacts);
+    if (d.world_joints.count > 0) {
+      device_->run(SolveProgram<soft_step::kRowKinds>{d}, contacts);
+    } else {
+      device_->run(SolveProgram<soft_step::kContactRowKinds>{d}, contacts);
+    }
     device_->run(CommitProgram{d}, contacts);
     mark(3);
   }

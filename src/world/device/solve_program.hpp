@@ -21,6 +21,9 @@ namespace device {
 ///
 /// There is no deadlock. The items of a thread have the order of the sweeps, and an item waits only
 /// for earlier items in this order, so the first incomplete item is always ready.
+/// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program without
+///   rows of joints needs fewer registers
+template <soft_step::RowKind kKinds>
 struct SolveProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
   /// Minimum number of items per thread for a second block per multiprocessor. Waiting threads poll
@@ -157,7 +160,7 @@ struct SolveProgram {
       program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index, item);
     }
     JFPX_HD bool is_ready(BodyItem* item) const {
-      if (item->is_active && !item->is_ready) item->read<true>(program_.data);
+      if (item->is_active && !item->is_ready) item->template read<true>(program_.data);
       return item->is_ready || !item->is_active;
     }
     JFPX_HD void complete(BodyItem* item) const {
@@ -196,13 +199,18 @@ struct SolveProgram {
     }
   }
 
+  template <class F>
+  JFPX_HD static decltype(auto) visit_row(soft_step::RowKind kind, const F& f) {
+    return soft_step::visit_row<0, kKinds>(kind, f);
+  }
+
   /// Initializes a row without its tickets.
   JFPX_HD void begin_row(const Sweep& sweep, std::uint32_t r, RowItem* item) const {
     const StepData& d = data;
     item->row = r;
     item->kind = sweep.kind_of(r);
     std::uint32_t a = 0, b = 0;
-    soft_step::visit_row(item->kind, [&](auto type) {
+    visit_row(item->kind, [&](auto type) {
       using Row = typename decltype(type)::type;
       if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
         item->sphere = d.sphere_rows.load(r);
@@ -232,8 +240,9 @@ struct SolveProgram {
     if (item->row == kNone) return true;
     const auto read = [&](ItemBody* body) {
       if (body->is_ready) return;
-      soft_step::visit_row(
-          item->kind, [&](auto type) { body->read<decltype(type)::type::kReadsRotation>(data); });
+      visit_row(item->kind, [&](auto type) {
+        body->template read<decltype(type)::type::kReadsRotation>(data);
+      });
     };
     read(&item->a);
     read(&item->b);
@@ -243,7 +252,7 @@ struct SolveProgram {
   template <class Operation>
   JFPX_HD void solve_row(const Sweep& sweep, const Operation& operation, RowItem* item) const {
     if (item->row == kNone) return;
-    soft_step::visit_row(item->kind, [&](auto type) {
+    visit_row(item->kind, [&](auto type) {
       using Row = typename decltype(type)::type;
       if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
         solve_spheres(sweep, operation, item);
@@ -348,7 +357,9 @@ struct SolveProgram {
     }
     if (sweep.stage == BodyStage::move) {
       d.step.move(i, &body);
-      if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], sweep.moves() + 1);
+      if constexpr (kKinds > soft_step::kContactRowKinds) {
+        if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], sweep.moves() + 1);
+      }
     }
     if (sweep.stage == BodyStage::accelerate) {
       free.read(cells, item->version);
@@ -405,7 +416,7 @@ struct SolveProgram {
   template <class Operation>
   JFPX_HD void solve_fixed(const Sweep& sweep, const Operation& operation, std::uint32_t r,
                            BodyItem* item, BodyFree* free) const {
-    soft_step::visit_row(sweep.kind_of(r), [&](auto type) {
+    visit_row(sweep.kind_of(r), [&](auto type) {
       using Row = typename decltype(type)::type;
       if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
         solve_fixed_spheres(sweep, operation, r, item, free);
