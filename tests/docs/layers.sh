@@ -39,6 +39,17 @@ while IFS=: read -r file target; do
   case "$target" in */cpu/*) other=cpu ;; */cuda/*) other=cuda ;; *) continue ;; esac
   [ -z "$own" ] || [ "$own" = "$other" ] || { echo "$file includes src/$target, another backend"; status=1; }
 done < <(grep -rHoE '^ *#include "src/[^"]+' src | sed 's/ *#include "src\///')
+# Folders of src/world, the lowest first. A folder may include those before it, and no file of src/world itself.
+world_folders=(bodies contacts joints forces queries step device cuda snapshots recording)
+while IFS=: read -r file target; do
+  from=${file#src/world/} to=${target#world/}
+  case "$from" in */*) from=${from%%/*} ;; *) continue ;; esac
+  case "$to" in */*) to=${to%%/*} ;; *) echo "$file includes src/$target, which is above it"; status=1; continue ;; esac
+  # The one file that makes the world on a CUDA device, if there is one.
+  [ "$file->$to" != "src/world/device/device_world.cpp->cuda" ] || continue
+  [[ " ${world_folders[*]} " == *" $to "*"$from "* || $to = "$from" ]] ||
+    { echo "$file includes src/$target, but world/$from may not use world/$to"; status=1; }
+done < <(grep -rHoE '^ *#include "src/world/[^"]+' src/world | sed 's/ *#include "src\///')
 if grep -rnE '#include "src/|#include <src/' include; then
   echo "include/jfpx may not use src"
   status=1
