@@ -196,6 +196,11 @@ class SphereCollider:
         self._on_devices: dict[Any, Any] = {}
         self._collider = core.Collider(*_arrays.options(backend, algorithm, threads, device))
         self._lock = threading.Lock()
+        self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device}
+
+    def __reduce__(self) -> Any:
+        """The dtype and the options: a copy has buffers of its own."""
+        return functools.partial(SphereCollider, **self._options), (self._dtype.name,)
 
     @property
     def dtype(self) -> np.dtype:

@@ -248,8 +248,15 @@ class World:
         self._dtype = scene.dtype
         self._core = _arrays.precision_of(self._dtype).World(
             scene._scene, *_arrays.options(backend, algorithm, threads, device))
+        self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device}
         self._device = device
         self._report: StepReport | None = None
+
+    def __reduce__(self) -> Any:
+        """The scene, the options and a snapshot: pickle and copy.deepcopy() make a world that
+        continues with the same bits. A world with functions as forces cannot be copied: the copy
+        raises InvalidSnapshot."""
+        return _restored, (self.scene, self._options, self.snapshot())
 
     # Steps
 
@@ -903,3 +910,9 @@ def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:
         return None
     _arrays.function(filter, "filter")
     return lambda body: bool(filter(BodyId(*body)))
+
+
+def _restored(scene: Scene, options: dict[str, Any], snapshot: bytes) -> World:
+    world = World(scene, **options)
+    world.restore(snapshot)
+    return world

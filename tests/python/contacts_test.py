@@ -1,6 +1,7 @@
 """Contacts and pairs, against brute force in float64."""
 
 import gc
+import pickle
 import resource
 import threading
 import time
@@ -487,3 +488,12 @@ def test_calls_do_not_leak():
     calls(50_000)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     assert grown < 4096, f"{grown} KiB in 10^5 calls"
+
+
+def test_a_pickled_collider_has_its_options(dtype):
+    collider = jfpx.SphereCollider(dtype, backend="cpu", algorithm="grid", threads=2)
+    collider.find_contacts(np.zeros((3, 3), dtype), 1)
+    copied = pickle.loads(pickle.dumps(collider))
+    assert copied.dtype == collider.dtype and copied.backend == "cpu"
+    copied.find_contacts(np.zeros((3, 3), dtype), 1)
+    assert copied.algorithm == collider.algorithm

@@ -1,5 +1,6 @@
 """Worlds, scenes and recordings."""
 
+import copy
 import gc
 import os
 import pathlib
@@ -449,6 +450,21 @@ def test_steps_after_a_restoration_have_the_same_bits(dtype):
     world.restore(snapshot)
     world.run(40)
     assert world.state_hash() == other.state_hash()
+
+
+def test_a_pickled_or_copied_world_continues_with_the_same_bits(dtype):
+    world = jfpx.World(jfpx.Scene.named("mixed", spheres=20, dtype=dtype), backend="cpu", threads=2)
+    world.run(20)
+    world.remove(world.bodies[3])
+    for duplicate in (copy.deepcopy, lambda original: pickle.loads(pickle.dumps(original))):
+        copied = duplicate(world)
+        assert copied.snapshot() == world.snapshot() and copied.scene == world.scene
+        world.run(10)
+        copied.run(10)
+        assert copied.state_hash() == world.state_hash()
+    world.add_force(lambda context: None)
+    with pytest.raises(jfpx.InvalidSnapshot, match="force"):
+        copy.deepcopy(world)
 
 
 def test_a_damaged_snapshot_is_a_named_exception(dtype):
