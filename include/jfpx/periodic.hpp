@@ -36,7 +36,7 @@ struct PeriodicContact {
 /// shift have the bits of an open search, whatever the lengths are. The bits do not depend on the
 /// collider.
 /// @throws InvalidArgument like SphereCollider::find_contacts(); for a length that is not > 0,
-///   exceeds half of the largest number, or is less than four times the largest radius; for a
+///   exceeds 2^60 in float or 2^508 in double, or is less than four times the largest radius; for a
 ///   centre that is 2^20 lengths or more from the origin. std::bad_alloc
 JFPX_API std::vector<PeriodicContact> find_periodic_contacts(
     SphereCollider& collider, std::span<const SphereInstance> spheres, const PeriodicCell& cell);

@@ -6,7 +6,6 @@
 #include "src/collide/sphere_pair.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -25,10 +24,9 @@ JFPX_HD inline ImageShift shift_of(std::uint32_t code) {
   return {c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1};
 }
 
-/// Whether the length is in the range in which images are finite.
-JFPX_HD inline bool is_length(Real length) {
-  return length > 0 && length <= std::numeric_limits<Real>::max() / 2;
-}
+/// Largest length of a cell: squares of distances in a few cells are finite.
+inline constexpr auto kLongestPeriod = static_cast<Real>(sizeof(Real) == 4 ? 0x1p60 : 0x1p508);
+JFPX_HD inline bool is_length(Real length) { return length > 0 && length <= kLongestPeriod; }
 /// Whether spheres of this radius may be in the cell.
 JFPX_HD inline bool fits(const PeriodicCell& cell, Real radius) {
   bool result = true;
@@ -145,10 +143,8 @@ JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real le
   if (shift == 0) return a - b;
   // Both products are exact: the upper part of the length has 27 bits, and a shift has at most 22
   // (Dekker 1971).
-  const bool is_large = static_cast<double>(length) > 0x1p900;
-  const double scaled = static_cast<double>(length) * (is_large ? 0x1p-100 : 1);
-  const double product = scaled * ((1 << 26) + 1), rounded = product - (product - scaled);
-  const double upper = rounded * (is_large ? 0x1p100 : 1);
+  const double product = static_cast<double>(length) * ((1 << 26) + 1);
+  const double upper = product - (product - static_cast<double>(length));
   double error = 0;
   double sum = sum_with_error(a, -static_cast<double>(b), &error);
   sum = sum_with_error(sum, -static_cast<double>(shift) * upper, &error);

@@ -24,7 +24,7 @@ inline void check_cell(const PeriodicCell& cell, Real largest_radius, const std:
     if (!cell.repeats[static_cast<std::size_t>(k)]) continue;
     if (!is_length(length)) {
       throw InvalidArgument(name + "> 0 and at most " +
-                            to_text(std::numeric_limits<Real>::max() / 2));
+                            to_text(kLongestPeriod));
     }
     if (!(largest_radius <= length / 4)) {
       throw InvalidArgument(name + "at least twice the cutoff, which is " +

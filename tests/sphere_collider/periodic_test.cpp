@@ -295,6 +295,8 @@ TEST(Periodic, BadCellsAndCentresAreNamed) {
   EXPECT_THAT(message({{0, 9, 9}}, {{}, 1}), HasSubstr("periodic length x is 0"));
   EXPECT_THAT(message({{9, -1, 9}}, {{}, 1}), HasSubstr("periodic length y is -1"));
   EXPECT_THAT(message({{9, 9, inf}}, {{}, 1}), HasSubstr("periodic length z is inf"));
+  const Real long_cell = sizeof(Real) == 4 ? Real(1e19) : std::exp2(Real(509));
+  EXPECT_THAT(message({{9, 9, long_cell}}, {{}, 1}), HasSubstr("it must be > 0 and at most"));
   EXPECT_THAT(
       message({{9, Real(3.5), 9}}, {{}, 1}),
       HasSubstr("periodic length y is 3.5; it must be at least twice the cutoff, which is 2"));
