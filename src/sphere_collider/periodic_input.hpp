@@ -23,8 +23,7 @@ inline void check_cell(const PeriodicCell& cell, Real largest_radius, const std:
         system + "periodic length " + "xyz"[k] + " is " + to_text(length) + "; it must be ";
     if (!cell.repeats[static_cast<std::size_t>(k)]) continue;
     if (!is_length(length)) {
-      throw InvalidArgument(name + "> 0 and at most " +
-                            to_text(kLongestPeriod));
+      throw InvalidArgument(name + "> 0 and at most " + to_text(kLongestPeriod));
     }
     if (!(largest_radius <= length / 4)) {
       throw InvalidArgument(name + "at least twice the cutoff, which is " +
