@@ -25,7 +25,8 @@ BodyDef hanging_box(const Vec3& position, const Vec3& half_extents, Real mass) {
 
 /// Two ropes between the ends of two bodies. @param end_a,end_b in body axes; z is ignored
 void tie(Scene& scene, BodyId a, BodyId b, const Vec3& end_a, const Vec3& end_b) {
-  for (const Real side : {kHalfWidth * Real(-0.9), kHalfWidth * Real(0.9)}) {
+  constexpr Real kSide = kHalfWidth * Real(0.9);
+  for (const Real side : {-kSide, kSide}) {
     DistanceJoint rope{.a = a, .b = b};
     rope.anchor_a = {end_a.x, end_a.y, side};
     rope.anchor_b = {end_b.x, end_b.y, side};
