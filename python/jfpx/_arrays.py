@@ -83,8 +83,7 @@ def to_host(array: Any, name: str) -> np.ndarray:
     """An array in host memory as a NumPy array, without a copy where it has DLPack."""
     if isinstance(array, np.ma.MaskedArray):
         if np.ma.is_masked(array):
-            raise InvalidArgument(f"{name} has masked elements; pass an array without them, such as "
-                                  f"{name}[~{name}.mask.any(axis=1)].data")
+            raise InvalidArgument(f"{name} has masked elements; pass arrays without them")
         return array.data
     if isinstance(array, np.ndarray):
         return array
@@ -128,12 +127,14 @@ def rows(array: Any, name: str, columns: int, dtype: Any = None) -> np.ndarray:
 
 def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
     """Radii: a number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
-    if isinstance(array, (bool, np.bool_)):
-        raise InvalidArgument(f"{name} is {array}; it must be a number or an array of shape ({size},)")
-    if isinstance(array, (int, float, np.integer, np.floating)):
+    if isinstance(array, (int, float, np.number)) and not isinstance(array, bool):
         return check_radii(_single(array, dtype), name)
     given = hasattr(array, "dtype")
+    if not given:
+        array = plain_numbers(array, name)
     array = to_host(array, name)
+    if array.dtype.kind not in "fiu":
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be an array of numbers")
     if array.ndim == 0:
         return check_radii(_single(array, dtype), name)
     if array.shape != (size,):
@@ -156,16 +157,35 @@ def check_square(distance: float, what: str, dtype: Any) -> None:
 def check_radii(radii: np.ndarray, name: str) -> np.ndarray:
     """Raises as check_square() for the sum of two radii. Leaves invalid radii to the search, which names
     the first one. @returns the radii"""
-    low, high = radii.min(), radii.max()
-    if 0 < low and high < np.inf:
-        for radius in (low, high):
-            check_square(2 * float(radius), f"{name} has the radius {radius:g}", radii.dtype)
+    low, high = float(radii.min()), float(radii.max())
+    if not (0 < low and high < np.inf):
+        return radii
+    if radii.size > 1:  # a sphere does not touch itself
+        smallest = np.partition(radii, 1)[:2]
+        low = float(smallest.sum(dtype=np.float64)) / 2
+    for radius in (low, high):
+        check_square(2 * radius, f"{name} has the radius {radius:g}", radii.dtype)
     return radii
 
 
+def plain_numbers(value: Any, name: str) -> np.ndarray:
+    """An object without a dtype as an array, unless it has booleans or texts, which NumPy converts."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError) as error:  # rows of different lengths
+        raise InvalidArgument(f"{name} is not an array of numbers: {error}") from None
+    if array.dtype.kind not in "fiuO":
+        raise InvalidArgument(f"{name} is not an array of numbers: it has {array.dtype.name}")
+    return value
+
+
 def _single(value: Any, dtype: Any) -> np.ndarray:
-    with np.errstate(over="ignore"):  # infinity is refused where it is not allowed
-        return np.full(1, value, dtype)
+    """An array of size 1, of infinity where a number is out of range, which the search refuses."""
+    with np.errstate(over="ignore"):
+        try:
+            return np.full(1, value, dtype)
+        except OverflowError:  # an integer of Python
+            return np.full(1, np.inf, dtype)
 
 
 def converted(array: Any, name: str, dtype: Any) -> np.ndarray:
@@ -215,12 +235,15 @@ def triple(value: Any, name: str, size: int = 3) -> tuple[float, ...]:
 
 def number(value: Any, name: str) -> float:
     """A number that is not NaN."""
-    if isinstance(value, (bool, np.bool_, str, bytes)):  # which float() converts
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if isinstance(value, (bool, str, bytes)) or kind in ("b", "U", "S"):  # which float() converts
         raise InvalidArgument(f"{name} is {value!r}; it must be a number")
     try:
         result = float(value)
     except (TypeError, ValueError):
         raise InvalidArgument(f"{name} is {value!r}; it must be a number") from None
+    except OverflowError:
+        result = math.inf
     if math.isnan(result):
         raise InvalidArgument(f"{name} is nan; it must be a number")
     return result
@@ -243,34 +266,38 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     each."""
     if lengths is None:
         return None
-    if getattr(lengths, "shape", None) == (3, 3) or _is_matrix(lengths, systems):
-        meaning = "" if systems != 3 else ", or a list of three tuples of lengths for the three systems"
-        raise InvalidArgument("periodic is a matrix; it must be the three lengths of an orthogonal cell, such as "
-                              f"periodic.diagonal(){meaning}")
     try:
         lengths = list(lengths)
     except TypeError:
         raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
-    if systems is None or not any(hasattr(row, "__len__") for row in lengths):
+    has_rows = any(row is not None and not isinstance(row, str) and np.ndim(row) > 0 for row in lengths)
+    if has_rows and systems is None:
+        raise InvalidArgument("periodic is a matrix; it must be the three lengths of an orthogonal cell, such as "
+                              "periodic.diagonal()")
+    if not lengths and systems == 0:
+        return np.empty((0, 3))
+    if not has_rows:
         return np.array([_cell(lengths)] * (1 if systems is None else systems)).reshape(-1, 3)
     if len(lengths) != systems:
         raise InvalidArgument(f"periodic has {len(lengths)} cells; it must have one for each of "
                               f"{systems} systems")
-    return np.array([_cell(row) for row in lengths])
-
-
-def _is_matrix(lengths: Any, systems: int | None) -> bool:
-    """Whether the argument is a list of three rows without systems that they could belong to."""
-    return (systems is None and hasattr(lengths, "__len__") and len(lengths) == 3
-            and all(hasattr(row, "__len__") and not isinstance(row, str) and len(row) == 3 for row in lengths))
+    for row in lengths:
+        if row is None or isinstance(row, str) or np.ndim(row) == 0:
+            raise InvalidArgument(f"periodic has the cell {row!r}; it must be three lengths")
+    rows = [_cell(row) for row in lengths]
+    # Lengths of three systems, unless they are the vectors of one cell: its matrix is symmetric, or triangular.
+    matrix = np.array(rows)
+    if systems == 3 and hasattr(lengths[0], "dtype") and np.array_equal(matrix, matrix.T) and len(set(map(tuple, rows))) > 1:
+        raise InvalidArgument("periodic is a matrix; it must be a row of three lengths for each system")
+    return matrix
 
 
 def _cell(lengths: Any) -> list[float]:
     if len(lengths) != 3:
         raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
     for length in lengths:
-        if isinstance(length, (bool, np.bool_)) or (not isinstance(length, str) and np.ndim(length) == 0
-                                                    and length is not None and length == 0):
+        if isinstance(length, (bool, np.bool_)) or (length is not None and not isinstance(length, str)
+                                                    and np.ndim(length) == 0 and length == 0):
             raise InvalidArgument(f"periodic is {tuple(lengths)}; it must be the three lengths of the cell, and "
                                   "None along axes that do not repeat, such as (10, 10, None)")
     return [math.nan if length is None else number(length, "periodic") for length in lengths]

@@ -200,7 +200,7 @@ class SphereCollider:
 
     def __reduce__(self) -> Any:
         """The dtype and the options: a copy has buffers of its own."""
-        return functools.partial(SphereCollider, **self._options), (self._dtype.name,)
+        return functools.partial(type(self), **self._options), (self._dtype.name,)
 
     @property
     def dtype(self) -> np.dtype:

@@ -227,9 +227,10 @@ class DeviceSearch:
         """The arguments of the binding for positions and their radii."""
         size = rows.shape[0]
         start = (rows.address, size, *rows.strides)
-        if isinstance(radii, (int, float)) or getattr(radii, "shape", None) == ():
-            radius = np.full(1, float(radii), self.dtype)  # waits, where it is on the device
-            return *start, 0, 0, float(_arrays.check_radii(radius, name)[0])
+        if isinstance(radii, (bool, int, float)) or getattr(radii, "shape", None) == ():
+            if hasattr(radii, "shape"):
+                radii = radii.item()  # waits, where it is on the device
+            return *start, 0, 0, float(_arrays.vector(radii, name, 1, self.dtype)[0])
         view = self._view(radii, name)
         if view.shape != (size,):
             raise InvalidArgument(f"{name} has shape {view.shape}; it must be a number or ({size},)")

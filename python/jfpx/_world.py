@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _arrays, _device
-from ._errors import Closed, ConcurrentUse, InvalidArgument
+from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._joints import JointId, JointState, arguments, joint_of
 from ._scene import Scene
@@ -256,7 +256,12 @@ class World:
         """The scene, the options and a snapshot: pickle and copy.deepcopy() make a world that
         continues with the same bits. A world with functions as forces cannot be copied: the copy
         raises InvalidSnapshot."""
-        return _restored, (self.scene, self._options, self.snapshot())
+        scene = self.scene
+        try:
+            scene.to_json()
+        except InvalidScene:  # restore() has replaced the solver by one for which the joints are invalid
+            scene = Scene({"bodies": []}, dtype=self._dtype)
+        return _restored, (type(self), scene, self._options, self.snapshot())
 
     # Steps
 
@@ -912,7 +917,7 @@ def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:
     return lambda body: bool(filter(BodyId(*body)))
 
 
-def _restored(scene: Scene, options: dict[str, Any], snapshot: bytes) -> World:
-    world = World(scene, **options)
+def _restored(kind: type[World], scene: Scene, options: dict[str, Any], snapshot: bytes) -> World:
+    world = kind(scene, **options)
     world.restore(snapshot)
     return world

@@ -51,27 +51,42 @@ JFPX_HD inline bool is_reducible(const Vec3& centre, const PeriodicCell& cell) {
   return result;
 }
 
-/// Reduces one coordinate to [-length/2, length/2), and returns the number of cells that it was
-/// displaced by. A coordinate in this range does not change.
+/// The sum of x and y, whose rounding error is added to *error (Knuth 1969).
+JFPX_HD inline double sum_with_error(double x, double y, double* error) {
+  const double sum = x + y, of_y = sum - x;
+  *error += (x - (sum - of_y)) + (y - of_y);
+  return sum;
+}
+/// a - (b + shift * length), as if it were rounded once, apart from errors of 2^-100 of the terms.
+JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real length) {
+  if (shift == 0) return a - b;
+  // Both products are exact: the upper part of the length has 27 bits, and a shift has at most 22
+  // (Dekker 1971).
+  const double product = static_cast<double>(length) * ((1 << 26) + 1);
+  const double upper = product - (product - static_cast<double>(length));
+  double error = 0;
+  double sum = sum_with_error(a, -static_cast<double>(b), &error);
+  sum = sum_with_error(sum, -static_cast<double>(shift) * upper, &error);
+  sum = sum_with_error(sum, -static_cast<double>(shift) * (static_cast<double>(length) - upper),
+                       &error);
+  return static_cast<Real>(sum + error);
+}
+
+/// Reduces one coordinate to about [-length/2, length/2), and returns the number of cells that it
+/// was displaced by. A coordinate in this range does not change; another one is rounded once.
 JFPX_HD inline std::int32_t reduce(Real* x, Real length) {
-  const Real half = length / 2;
-  if (*x >= -half && *x < half) return 0;
+  const Real half = length / 2, given = *x;
+  if (given >= -half && given < half) return 0;
 #if defined(__CUDA_ARCH__)
-  const Real cells = ::floor(*x / length + Real(0.5));
+  const Real cells = ::floor(given / length + Real(0.5));
 #else
-  const Real cells = std::floor(*x / length + Real(0.5));
+  const Real cells = std::floor(given / length + Real(0.5));
 #endif
-  *x -= cells * length;
   auto count = static_cast<std::int32_t>(cells);
-  // The quotient and the difference are rounded.
-  if (*x < -half) {
-    *x += length;
-    --count;
-  }
-  if (*x >= half) {
-    *x -= length;
-    ++count;
-  }
+  *x = image_difference(given, 0, count, length);
+  // The quotient is rounded.
+  if (*x < -half) *x = image_difference(given, 0, --count, length);
+  if (*x >= half) *x = image_difference(given, 0, ++count, length);
   return count;
 }
 
@@ -87,9 +102,8 @@ JFPX_HD inline SphereInstance reduced(SphereInstance sphere, const PeriodicCell&
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
     if (!cell.repeats[axis]) continue;
-    const Real given = absolute(sphere.centre[k]), length = cell.lengths[k];
-    (*cells)[axis] = reduce(&sphere.centre[k], length);
-    if ((*cells)[axis] != 0) error += (given + 4 * length) * kEpsilon;
+    (*cells)[axis] = reduce(&sphere.centre[k], cell.lengths[k]);
+    if ((*cells)[axis] != 0) error += cell.lengths[k] * kEpsilon;
   }
   sphere.radius = (sphere.radius + error) * (1 + 16 * kEpsilon);
   return sphere;
@@ -130,27 +144,6 @@ JFPX_HD inline std::uint32_t near_images(const Vec3& centre, const PeriodicCell&
     codes = product;
   }
   return codes & ~(1u << kNoShift);
-}
-
-/// The sum of x and y, whose rounding error is added to *error (Knuth 1969).
-JFPX_HD inline double sum_with_error(double x, double y, double* error) {
-  const double sum = x + y, of_y = sum - x;
-  *error += (x - (sum - of_y)) + (y - of_y);
-  return sum;
-}
-/// a - (b + shift * length), as if it were rounded once, apart from errors of 2^-100 of the terms.
-JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real length) {
-  if (shift == 0) return a - b;
-  // Both products are exact: the upper part of the length has 27 bits, and a shift has at most 22
-  // (Dekker 1971).
-  const double product = static_cast<double>(length) * ((1 << 26) + 1);
-  const double upper = product - (product - static_cast<double>(length));
-  double error = 0;
-  double sum = sum_with_error(a, -static_cast<double>(b), &error);
-  sum = sum_with_error(sum, -static_cast<double>(shift) * upper, &error);
-  sum = sum_with_error(sum, -static_cast<double>(shift) * (static_cast<double>(length) - upper),
-                       &error);
-  return static_cast<Real>(sum + error);
 }
 
 /// Tests a sphere with the image of another one, from the given centres: the difference of the

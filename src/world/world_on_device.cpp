@@ -69,9 +69,9 @@ void World::Impl::enter_device() {
   force_table.invalidate();
   store.make_inertia_arrays();  // bodies of any kind may be added and edited on the device
   device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
-  mirror.enter();
-  device->upload_joints(&joints);
   note_forces();
+  mirror.enter();
+  flush_joints();
 }
 
 BodyStore& World::Impl::edited_body(std::uint32_t body, const BodyEdit& edit) {

@@ -331,17 +331,27 @@ NAN = np.array([[0, 0, 0], [0, np.nan, 0]], np.float32)
     (lambda: jfpx.find_pairs(POINTS, "near"), "cutoff is 'near'"),
     (lambda: jfpx.find_pairs(POINTS, "0.5"), "cutoff is '0.5'; it must be a number"),
     (lambda: jfpx.find_pairs(POINTS, True), "cutoff is True; it must be a number"),
-    (lambda: jfpx.find_contacts(POINTS, True), "radii is True"),
+    (lambda: jfpx.find_contacts(POINTS, True), "radii is not an array of numbers: it has bool"),
     (lambda: jfpx.find_pairs(POINTS, 1e20), "cutoff is 1e\\+20, and the square of the distance 1e\\+20 is not exact"),
     (lambda: jfpx.find_pairs(POINTS, 1e-20), "not exact in float32; use a unit of length"),
     (lambda: jfpx.find_pairs(POINTS.astype(float), 1e160), "not exact in float64"),
-    (lambda: jfpx.find_contacts(POINTS, np.array([1, 1, 1e-30], np.float32)), "radii has the radius 1e-30"),
+    (lambda: jfpx.find_contacts(POINTS, np.array([1, 1e-30, 1e-30], np.float32)), "radii has the radius 1e-30"),
     (lambda: jfpx.find_contacts(np.ma.masked_less(POINTS, 1), 1), "positions has masked elements"),
     (lambda: jfpx.find_pairs(POINTS, 1, batch=[0, 0, 1]), r"an element for each of 3 points; .*bincount\(batch\)"),
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=(True, True, False)), r"periodic is \(True, True, False\); .* lengths"),
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=np.diag([9, 9, 9])), r"periodic is a matrix; .* periodic.diagonal\(\)"),
     (lambda: jfpx.find_pairs(POINTS, 1, periodic=[[9, 0, 0], [0, 9, 0], [0, 0, 9]]), "periodic is a matrix"),
-    (lambda: jfpx.find_pairs(POINTS, 1, periodic=np.full((3, 3), 9.0), batch=[0, 1, 2, 3]), "list of three tuples"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=np.array([[9, 1, 1], [1, 9, 1], [1, 1, 9]]), batch=[0, 1, 2, 3]),
+     "periodic is a matrix; it must be a row"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=np.array(9.0)), "it must be three lengths"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[(9, 9, 9), None], batch=[0, 1, 3]), "the cell None"),
+    (lambda: jfpx.find_pairs(POINTS, 1, periodic=[10**400] * 3), "periodic length x is inf"),
+    (lambda: jfpx.find_pairs(POINTS, 10**400), "must be finite and > 0"),
+    (lambda: jfpx.find_contacts(POINTS, 10**400), "radius is inf"),
+    (lambda: jfpx.find_contacts(POINTS, ["1"] * 3), "radii is not an array of numbers"),
+    (lambda: jfpx.find_contacts(POINTS, [True] * 3), "radii is not an array of numbers"),
+    (lambda: jfpx.find_contacts(POINTS, np.array(True)), "radii has dtype bool"),
+    (lambda: jfpx.find_pairs(POINTS, np.array(True)), "it must be a number"),
     (lambda: jfpx.find_pairs(POINTS, 1, query=POINTS[0]), r"query has shape \(3,\)"),
     (lambda: jfpx.find_pairs(POINTS, 1, query=POINTS.astype(float)), "query has dtype float64"),
     (lambda: jfpx.find_pairs(POINTS, 1, query=POINTS, query_radii=1), "query_radii requires radii"),
@@ -497,3 +507,15 @@ def test_a_pickled_collider_has_its_options(dtype):
     assert copied.dtype == collider.dtype and copied.backend == "cpu"
     copied.find_contacts(np.zeros((3, 3), dtype), 1)
     assert copied.algorithm == collider.algorithm
+
+
+def test_lengths_and_radii_of_any_kind_are_taken(dtype):
+    points = np.zeros((3, 3), dtype)
+    points[1:, 0] = 8.5
+    for lengths in (np.array([9, 9, 9]), [np.array(9.0)] * 3, (np.float32(9), 9, None), [9, None, None]):
+        assert jfpx.find_pairs(points, 1, periodic=lengths).pairs.shape == (2, 3)
+    for cells in (np.full((3, 3), 9.0), [[9, 9, 9]] * 3, np.array([[9, 8, 7], [9, 9, 9], [5, 6, 7]])):
+        assert jfpx.find_pairs(points, 1, periodic=cells, batch=[0, 1, 2, 3]).pairs.shape == (2, 0)
+    assert jfpx.find_pairs(points[:0], 1, periodic=np.empty((0, 3)), batch=[0]).pairs.shape == (2, 0)
+    for radii in (1, np.int64(1), np.float32(1), [1, 1, 1], (1.0, 1.0, 1.0), np.array([1e-17, 1, 1]).astype(dtype)):
+        assert jfpx.find_contacts(points, radii).pairs.shape[1] == 1

@@ -467,6 +467,16 @@ def test_a_pickled_or_copied_world_continues_with_the_same_bits(dtype):
         copy.deepcopy(world)
 
 
+def test_a_world_with_another_solver_than_its_scene_is_copied():
+    world = jfpx.World("bridge")
+    world.restore(jfpx.World("boxes-and-balls").snapshot())
+    assert copy.deepcopy(world).state_hash() == world.state_hash()
+
+    class Named(jfpx.World):
+        pass
+    assert type(copy.copy(Named("pile"))) is Named
+
+
 def test_a_damaged_snapshot_is_a_named_exception(dtype):
     world = jfpx.World({"bodies": [BALL]}, dtype=dtype)
     snapshot, before = world.snapshot(), world.state_hash()

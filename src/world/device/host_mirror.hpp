@@ -27,11 +27,11 @@ struct HostMirror {
 
   bool is_resident() const noexcept { return holder == Holder::device; }
 
-  /// Records that the device owns the state.
+  /// Records that the device owns the state, but not the joints.
   void enter() noexcept {
     holder = Holder::device;
     motion = Motion::all;
-    joints = Joints::equal;
+    joints = Joints::newer_on_host;
     has_contact_set = true;
   }
   /// Records that the host owns the state and the device copy is invalid.
