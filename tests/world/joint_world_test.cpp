@@ -126,6 +126,21 @@ TEST(JointWorld, IdsAreNeverReused) {
   EXPECT_EQ(std::get<DistanceJoint>(world.joint(second)).max_length, 1);
 }
 
+/// The entries of a joint at both of its bodies may follow each other, and are removed together.
+TEST(JointWorld, TheBodiesOfAChainAreRemovedOneByOne) {
+  Scene scene;
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    scene.bodies.push_back(ball({3 * static_cast<Real>(i), 0, 0}));
+    if (i > 0) scene.joints.push_back(rod_of(body(i - 1), body(i), 3));
+  }
+  World world(scene);
+  for (std::uint32_t i = 0; i + 1 < 20; ++i) {
+    world.remove(body(i));
+    ASSERT_EQ(world.joints().size(), 18u - i);
+    world.step();
+  }
+}
+
 TEST(JointWorld, ABodyIsRemovedWithItsJoints) {
   Scene scene;
   scene.bodies = {ball({0, 5, 0}, 0.2_r)};

@@ -61,11 +61,16 @@ class JointStore {
   void remove(std::uint32_t joint) noexcept;
   /// Replaces a joint by one of the same type and bodies; keeps the impulses.
   void set(std::uint32_t joint, const Joint& value) noexcept;
-  /// Calls f(joint) for all joints of a body.
+  /// Calls f(joint) for all joints of a body, in ascending order. f may remove the joint.
   template <class F>
   void for_each_of(std::uint32_t body, const F& f) const {
-    for (auto at = of_body_.lower_bound({body, 0}); at != of_body_.end() && at->first == body;) {
-      f((at++)->second);  // which may remove the joint
+    // An iterator to the next entry would not do: it may be that of the joint at its other body.
+    for (std::uint64_t next = 0;;) {
+      const auto at = of_body_.lower_bound({body, static_cast<std::uint32_t>(next)});
+      if (at == of_body_.end() || at->first != body) return;
+      const std::uint32_t joint = at->second;
+      next = std::uint64_t{joint} + 1;
+      f(joint);
     }
   }
   /// Whether a joint excludes contacts of two bodies.
