@@ -234,6 +234,7 @@ StepReport World::Impl::make_step() {
       contacts.complete_step();
     } else {
       undo();
+      report.contacts = report.sphere_contacts = report.generated_contacts = 0;
     }
   } catch (const std::bad_alloc&) {
     undo();
@@ -244,7 +245,8 @@ StepReport World::Impl::make_step() {
   }
   report.step = steps;
   report_backend(&report);
-  if (!resident()) report.awake = count_awake();
+  if (report.non_finite && resident()) fetch_motion();  // the device reports complete steps only
+  if (report.non_finite || !resident()) report.awake = count_awake();
   report.total_ms = watch.lap_ms();
   spent_us = 1e3 * report.total_ms;
   note_rest(report);

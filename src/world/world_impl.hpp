@@ -185,7 +185,8 @@ struct World::Impl {
   /// Wakes the bodies in contact with a body that is removed or changed.
   void wake_neighbors(BodyId body) {
     finish();
-    if (resident()) {
+    // After an upload, the device does not have the contacts that only the lists contain.
+    if (resident() && !mirror.has_contact_set) {
       edited_body(body.index, {.wakes_neighbors = true});
       return;
     }

@@ -137,6 +137,7 @@ void World::Impl::remove(BodyId id) {
   // All operations that may throw precede the change of the store.
   soft_step.reserve(store.capacity());
   remember_listed(body);
+  if (mirror.has_contact_set) wake_neighbors(id);
   mirror.edits[body];
   remove_joints_of(body);
   mirror.edits[body] = {.wakes_neighbors = true, .is_removed = true};

@@ -520,6 +520,32 @@ TEST(DeviceQueue, AFailingDeviceIsReplacedInTheMiddleOfAQueue) {
   }
 }
 
+/// A device that has received a world does not have the contacts that only the lists of the host
+/// contain, such as those of a compound.
+TEST_P(DeviceQueueTest, NeighborsWakeRightAfterAnUpload) {
+  Compound compound;
+  for (const int x : {-1, 1}) compound.parts.push_back({Sphere{}, {Real(x), 0, 0}});
+  Scene scene;
+  scene.bodies.resize(2);
+  scene.bodies[0].shape = Box{{5, 1, 5}};
+  scene.bodies[0].mass = 0;
+  scene.bodies[1].shape = compound;
+  scene.bodies[1].position = {0, 2, 0};
+  for (const bool removes : {false, true}) {
+    World host = on_host(scene), device = on_device(scene);
+    make_steps(&host, 20);
+    const Snapshot snapshot = host.snapshot();
+    for (World* world : {&host, &device}) world->restore(snapshot);
+    cuda::device_states(device);
+    for (World* world : {&host, &device}) {
+      const BodyId floor = world->bodies()[0];
+      removes ? world->remove(floor) : world->set_filter(floor, {.category = 4});
+      world->step();
+    }
+    EXPECT_TRUE(host.snapshot() == device.snapshot()) << removes;
+  }
+}
+
 /// Parts of removed compounds stay in the arrays of the device until the world is sent again.
 TEST_P(DeviceQueueTest, CompoundsThatComeAndGoTakeNoMoreMemory) {
   Compound compound;

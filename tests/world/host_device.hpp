@@ -130,6 +130,8 @@ class HostDevice {
   void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char*) {
     buffer->reserve(count);
   }
+  template <class Program>
+  void load() {}
   void release_unused() {}
   template <class T>
   void upload(T* to, const T* from, std::size_t count) {

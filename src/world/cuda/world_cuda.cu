@@ -63,6 +63,12 @@ class CudaDevice {
     const DeviceGuard guard(device_);
     buffer->reserve(pool_, stream_.get(), count, what);
   }
+  /// Loads a program, so that it can be launched while a stream is being captured.
+  template <class Program>
+  void load() {
+    const DeviceGuard guard(device_);
+    limits_of<Program>();
+  }
   void release_unused() {
     wait();
     JFPX_CUDA_TRY(cudaMemPoolTrimTo(pool_.get(), 0));

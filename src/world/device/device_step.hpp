@@ -90,8 +90,10 @@ class DeviceStep final : public DeviceWorld {
   void upload_joints(JointStore* joints) override {
     const bool had_joints = data_.world_joints.count > 0;
     joints_.upload(transfer_, joints->view(), 1 - now(), room_, &data_);
-    // A program that a capture uses must have been launched before.
-    if (!had_joints && data_.world_joints.count > 0) has_stepped_ = false;
+    // Steps that are captured must not load a program.
+    if (!had_joints && data_.world_joints.count > 0) {
+      device_->template load<SolveProgram<soft_step::kRowKinds>>();
+    }
     is_ready_ = false;
     ++changes_;
   }
