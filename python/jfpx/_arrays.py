@@ -285,9 +285,10 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
         if row is None or isinstance(row, str) or np.ndim(row) == 0:
             raise InvalidArgument(f"periodic has the cell {row!r}; it must be three lengths")
     rows = [_cell(row) for row in lengths]
-    # Lengths of three systems, unless they are the vectors of one cell: its matrix is symmetric, or triangular.
+    # A symmetric 3 x 3 array is the matrix of one skewed cell, unless its three rows are equal.
     matrix = np.array(rows)
-    if systems == 3 and hasattr(lengths[0], "dtype") and np.array_equal(matrix, matrix.T) and len(set(map(tuple, rows))) > 1:
+    if (systems == 3 and hasattr(lengths[0], "dtype") and np.array_equal(matrix, matrix.T)
+            and len(set(map(tuple, rows))) > 1):
         raise InvalidArgument("periodic is a matrix; it must be a row of three lengths for each system")
     return matrix
 

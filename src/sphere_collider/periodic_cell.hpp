@@ -92,7 +92,7 @@ JFPX_HD inline std::int32_t reduce(Real* x, Real length) {
 
 /// A sphere in the cell whose radius covers the rounding of the reduction: if two spheres touch by
 /// touch_at(), their reduced spheres or images touch. A coordinate that is displaced has an error
-/// of at most epsilon (|x| + 4 lengths) / 2. The factor covers the roundings of both tests.
+/// of less than epsilon length. The factor covers the roundings of both tests.
 /// @param cells receives the displacements along the axes that repeat
 /// @param sphere its centre is_reducible()
 JFPX_HD inline SphereInstance reduced(SphereInstance sphere, const PeriodicCell& cell,
