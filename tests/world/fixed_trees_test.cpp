@@ -1,6 +1,7 @@
 /// Tests of the trees of the solids of mass 0: a test of every pair finds the same.
 #include "src/world/contacts/fixed_trees.hpp"
 
+#include "src/scene/compound.hpp"
 #include "tests/world/random_bodies.hpp"
 
 #include <gtest/gtest.h>
