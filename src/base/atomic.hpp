@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <type_traits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -36,6 +37,14 @@ void atomic_min_on_host(T* at, T value) {
          !shared.compare_exchange_weak(before, value, std::memory_order_relaxed)) {
   }
 }
+template <class T>
+void atomic_max_on_host(T* at, T value) {
+  const std::atomic_ref shared(*at);
+  T before = shared.load(std::memory_order_relaxed);
+  while (before < value &&
+         !shared.compare_exchange_weak(before, value, std::memory_order_relaxed)) {
+  }
+}
 }  // namespace detail
 #endif
 
@@ -52,6 +61,22 @@ JFPX_HD inline void atomic_min(std::uint64_t* at, std::uint64_t value) {
   atomicMin(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
 #else
   detail::atomic_min_on_host(at, value);
+#endif
+}
+
+JFPX_HD inline void atomic_max(std::uint32_t* at, std::uint32_t value) {
+#if defined(__CUDA_ARCH__)
+  atomicMax(at, value);
+#else
+  detail::atomic_max_on_host(at, value);
+#endif
+}
+
+JFPX_HD inline void atomic_max(std::uint64_t* at, std::uint64_t value) {
+#if defined(__CUDA_ARCH__)
+  atomicMax(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
+#else
+  detail::atomic_max_on_host(at, value);
 #endif
 }
 
@@ -84,28 +109,29 @@ JFPX_HD inline std::uint32_t atomic_exchange_if(std::uint32_t* at, std::uint32_t
 }
 
 /// Loads an item that other threads write during the same loop.
-JFPX_HD inline std::uint32_t load_shared(const std::uint32_t* at) {
+template <class T>
+JFPX_HD T load_shared(const T* at) {
 #if defined(__CUDA_ARCH__)
-  return *static_cast<const volatile std::uint32_t*>(at);
+  return *static_cast<const volatile T*>(at);
 #else
-  return std::atomic_ref(*const_cast<std::uint32_t*>(at)).load(std::memory_order_relaxed);
+  return std::atomic_ref(*const_cast<T*>(at)).load(std::memory_order_relaxed);
 #endif
 }
 
 /// Stores an item that other threads read or write during the same loop.
-JFPX_HD inline void store_shared(std::uint8_t* at, std::uint8_t value) {
+template <class T>
+JFPX_HD void store_shared(T* at, std::type_identity_t<T> value) {
 #if defined(__CUDA_ARCH__)
-  *static_cast<volatile std::uint8_t*>(at) = value;
+  *static_cast<volatile T*>(at) = value;
 #else
   std::atomic_ref(*at).store(value, std::memory_order_relaxed);
 #endif
 }
-JFPX_HD inline std::uint8_t load_shared(const std::uint8_t* at) {
-#if defined(__CUDA_ARCH__)
-  return *static_cast<const volatile std::uint8_t*>(at);
-#else
-  return std::atomic_ref(*const_cast<std::uint8_t*>(at)).load(std::memory_order_relaxed);
-#endif
+
+/// Raises an item to a value. Cheaper than atomic_max() if most values are not above the item.
+template <class T>
+JFPX_HD void raise(T* at, std::type_identity_t<T> value) {
+  if (load_shared(at) < value) atomic_max(at, value);
 }
 
 }  // namespace JFPX_ABI

@@ -1,6 +1,7 @@
 list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/bodies/body_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bodies/ignored_pairs.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/bodies/partition.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bodies/state_hash.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bodies/sub_shape_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_context.cpp

@@ -14,6 +14,7 @@
 #include "src/world/joints/joint_store.hpp"
 #include "src/world/queries/query_tree.hpp"
 #include "src/world/snapshots/force_snapshot.hpp"
+#include "src/world/snapshots/snapshot_file.hpp"
 #include "src/world/step/soft_step.hpp"
 #include "src/world/thesis_table.hpp"
 
@@ -250,6 +251,7 @@ struct World::Impl {
   void undo_motion() noexcept;
   void undo() noexcept;
   void write(BinaryWriter* writer);
+  SnapshotParts snapshot_parts() const;
   void read(BinaryReader* reader);
 
   std::unique_ptr<ThreadPool> pool;  ///< may be shared with the collider

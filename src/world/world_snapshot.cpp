@@ -22,7 +22,13 @@ void World::Impl::write(BinaryWriter* writer) {
   (*writer)(list.contacts, std::uint64_t{list.detected}, contacts.shows_list);
   write_forces(writer, forces);
   write_generators(writer, generators);
-  if (joints.capacity() > 0) write_joints(writer, joints);
+  if (snapshot_parts() >= SnapshotParts::joints) write_joints(writer, joints);
+  if (snapshot_parts() == SnapshotParts::joints_and_places) store.write_places(writer);
+}
+
+SnapshotParts World::Impl::snapshot_parts() const {
+  if (store.has_places()) return SnapshotParts::joints_and_places;
+  return joints.capacity() > 0 ? SnapshotParts::joints : SnapshotParts::none;
 }
 
 /// Reads and validates all data before changing the world.
@@ -44,6 +50,7 @@ void World::Impl::read(BinaryReader* reader) {
   GeneratorRestorer new_generators(reader, generators);
   JointStore new_joints;
   if (reader->left() > 0) new_joints = read_joints(reader, &colors, &bodies);
+  if (reader->left() > 0) bodies.read_places(reader);
   BinaryReader::require(reader->left() == 0, "it is too long");
   BinaryReader::require(new_joints.empty() || settings.solver == Solver::soft_step,
                         "it has joints, and the solver worst_first");
@@ -78,7 +85,7 @@ Snapshot World::snapshot() const {
     start_snapshot(&writer);
     impl_->fetch_all();
     impl_->write(&writer);
-    return finish_snapshot(&writer, impl_->joints.capacity() > 0);
+    return finish_snapshot(&writer, impl_->snapshot_parts());
   } catch (const std::bad_alloc&) {
     throw OutOfMemory("no memory for a snapshot of " + std::to_string(bodies().size()) + " bodies");
   }

@@ -16,17 +16,30 @@ namespace {
 
 using namespace soft_step;  // NOLINT: the namespace under test
 
-TEST(GreedyColoring, FindsTheLowestFreeColor) {
-  EXPECT_EQ(lowest_free_color(0), 0);
-  for (unsigned color = 0; color < kColors; ++color) {
-    EXPECT_EQ(lowest_free_color(~(std::uint64_t{1} << color)), color);
+TEST(GreedyColoring, TakesTheLowestFreeColorOfAClass) {
+  for (const bool is_inner : {true, false}) {
+    const unsigned first = is_inner ? 0 : kColorsPerClass;
+    UsedColors a, b, full;
+    EXPECT_EQ(take_lowest_color(is_inner, &a, &b), first);
+    EXPECT_EQ(take_lowest_color(is_inner, &a, &b), first + 1);
+    EXPECT_EQ(a.of_class(is_inner), 3u);
+    EXPECT_EQ(b.of_class(is_inner), 3u);
+    EXPECT_EQ(a.of_class(!is_inner), 0u);
+    full.of_class(is_inner) = ~std::uint64_t{0};
+    EXPECT_EQ(take_lowest_color(is_inner, &full, &b), kOverflowColor);
+    for (unsigned number = 0; number < kColorsPerClass; ++number) {
+      UsedColors one;
+      one.of_class(is_inner) = ~(std::uint64_t{1} << number);
+      UsedColors other;
+      EXPECT_EQ(take_lowest_color(is_inner, &one, &other), first + number);
+    }
   }
-  EXPECT_EQ(lowest_free_color(~std::uint64_t{0}), kOverflowColor);
 }
 
-/// One contact after the other, in the order of the hash of its key.
+/// One contact after the other, in the order of the hash of its key. Contacts whose bodies are both
+/// below `block` are inner.
 std::vector<std::uint8_t> colored_one_by_one(const std::vector<ContactKey>& keys,
-                                             std::uint32_t bodies) {
+                                             std::uint32_t bodies, std::uint32_t block) {
   std::vector<std::uint32_t> order(keys.size());
   std::iota(order.begin(), order.end(), 0u);
   std::ranges::sort(order, {},
@@ -34,10 +47,12 @@ std::vector<std::uint8_t> colored_one_by_one(const std::vector<ContactKey>& keys
   std::vector<std::vector<bool>> used(bodies, std::vector<bool>(kColors + 1, false));
   std::vector<std::uint8_t> colors(keys.size());
   for (const std::uint32_t i : order) {
-    std::uint8_t color = 0;
-    while (color < kColors && (used[keys[i].a][color] || used[keys[i].b][color])) ++color;
-    colors[i] = color;
-    if (color < kColors) used[keys[i].a][color] = used[keys[i].b][color] = true;
+    const bool is_inner = keys[i].a < block && keys[i].b < block;
+    std::uint8_t color = is_inner ? 0 : kColorsPerClass;
+    const std::uint8_t end = color + kColorsPerClass;
+    while (color < end && (used[keys[i].a][color] || used[keys[i].b][color])) ++color;
+    colors[i] = color < end ? color : kOverflowColor;
+    if (color < end) used[keys[i].a][color] = used[keys[i].b][color] = true;
   }
   return colors;
 }
@@ -57,11 +72,13 @@ TEST(GreedyColoring, IsThatOfTheSortedContactsForAnyNumberOfThreads) {
       key = {body(random) < bodies / 50 ? 0 : body(random), body(random), part(random), 0};
       if (key.a == key.b) key.b = (key.a + 1) % bodies;
     }
-    const std::vector<std::uint8_t> expected = colored_one_by_one(keys, bodies);
+    const std::vector<std::uint8_t> expected = colored_one_by_one(keys, bodies, bodies / 2);
     for (ThreadPool* const p : {static_cast<ThreadPool*>(nullptr), &pool}) {
       coloring.start(bodies, p);
       GreedyColoring::Portion portion(&coloring);
-      for (std::uint32_t i = 0; i < count; ++i) portion.add(keys[i], i);
+      for (std::uint32_t i = 0; i < count; ++i) {
+        portion.add(keys[i], i, keys[i].a < bodies / 2 && keys[i].b < bodies / 2);
+      }
       portion.flush();
       std::vector<std::uint8_t> colors(count, kNoColor);
       coloring.finish([&](std::uint32_t i, std::uint8_t color) { colors[i] = color; }, p);

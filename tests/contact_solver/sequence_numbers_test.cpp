@@ -13,19 +13,23 @@ TEST(SequenceNumbers, FormOneChainPerBody) {
   constexpr std::uint64_t kLast = std::uint64_t{1} << 63;
   for (const std::uint64_t colors : {std::uint64_t{0}, std::uint64_t{1}, kLast, kLast | 1,
                                      ~std::uint64_t{0}, std::uint64_t{0x8000400020001}}) {
-    std::uint32_t ticket = 0;  // before the first sweep
+    std::uint32_t ticket = 0;
     for (std::uint32_t sweep = 0; sweep < 3; ++sweep) {
       const Tickets tickets(sweep, colors);
-      ASSERT_EQ(tickets.first, ticket);
-      for (std::uint32_t color = 0; color < soft_step::kColors; ++color) {
+      if (sweep == 0) {
+        ASSERT_EQ(Tickets::before_sweep(sweep), ticket);
+      } else {
+        ASSERT_GT(Tickets::before_sweep(sweep), ticket);
+      }
+      ASSERT_GT(tickets.first, Tickets::before_sweep(sweep));
+      ticket = tickets.first;
+      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
         if ((colors >> color & 1) == 0) continue;
         ASSERT_EQ(tickets.before(color), ticket) << color;
         ASSERT_GT(tickets.after(color), ticket);
         ticket = tickets.after(color);
       }
-      ASSERT_EQ(tickets.before_body(), ticket);
-      ASSERT_GT(tickets.after_body(), ticket);
-      ticket = tickets.after_body();
+      ASSERT_EQ(tickets.last(), ticket);
     }
   }
 }

@@ -5,6 +5,7 @@
 
 #include "src/world/world_impl.hpp"
 #include "tests/world/host_device.hpp"
+#include "tests/world/several_blocks.hpp"
 
 #include <gtest/gtest.h>
 #if JFPX_HAS_CUDA
@@ -33,6 +34,7 @@ struct DeviceKind {
   friend void PrintTo(const DeviceKind& kind, std::ostream* out) { *out << kind.name; }
   std::string name;
   bool is_cuda = false;
+  std::uint32_t most_in_one_block = soft_step::kMostBodiesInOneBlock;
   std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;
   /// Captures the work that `work` enqueues on a stream. @returns a function that launches the
   /// graph on the default stream
@@ -92,17 +94,25 @@ inline std::function<void()> capture_on_cuda(World*,
 
 /// Without a GPU, only the host, unless JFPX_REQUIRE_CUDA is set.
 inline std::vector<DeviceKind> device_kinds() {
-  std::vector<DeviceKind> kinds{{"Host", false, make_host_device_world, capture_on_host}};
+  std::vector<DeviceKind> kinds{
+      {.name = "Host", .make = make_host_device_world, .capture = capture_on_host}};
 #if JFPX_HAS_CUDA
   bool has_device = std::getenv("JFPX_REQUIRE_CUDA") != nullptr;
   for (const BackendStatus& status : available_backends()) {
     has_device = has_device || (status.backend == Backend::cuda && status.usable);
   }
   if (has_device) {
-    kinds.push_back({"Cuda", true, [](const Scene& scene) { return make_device_world(scene); },
-                     capture_on_cuda});
+    kinds.push_back({.name = "Cuda",
+                     .is_cuda = true,
+                     .make = [](const Scene& scene) { return make_device_world(scene); },
+                     .capture = capture_on_cuda});
   }
 #endif
+  for (std::size_t i = kinds.size(); i-- > 0;) {
+    kinds.push_back(kinds[i]);
+    kinds.back().name += "WithBlocks";
+    kinds.back().most_in_one_block = 8;
+  }
   return kinds;
 }
 

@@ -10,6 +10,7 @@
 #include "tests/world/equal_worlds.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
+#include "tests/world/several_blocks.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,6 +36,7 @@ using MakeDevice = std::function<std::unique_ptr<DeviceWorld>(const Scene&)>;
 struct Kind {
   std::string name;
   MakeDevice make;
+  std::uint32_t most_in_one_block = soft_step::kMostBodiesInOneBlock;
 };
 
 class DeviceWorldTest : public testing::TestWithParam<Kind> {
@@ -47,6 +49,9 @@ class DeviceWorldTest : public testing::TestWithParam<Kind> {
   static World on_host(const Scene& scene) {
     return World(scene, {.collider = {.backend = Backend::cpu}});
   }
+
+ private:
+  test::SeveralBlocks several_blocks_{GetParam().most_in_one_block};
 };
 
 std::vector<Kind> kinds() {
@@ -55,6 +60,9 @@ std::vector<Kind> kinds() {
     if (status.backend == Backend::cuda && status.usable) {
       kinds.push_back({"Cuda", [](const Scene& scene) { return make_device_world(scene); }});
     }
+  }
+  for (std::size_t i = kinds.size(); i-- > 0;) {
+    kinds.push_back({kinds[i].name + "WithBlocks", kinds[i].make, 8});
   }
   return kinds;
 }

@@ -7,11 +7,14 @@
 #include "src/world/device/device_step.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <functional>
 #include <memory>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 namespace jfpx {
@@ -23,6 +26,48 @@ class HostTeam {
  public:
   void sync() const {}
   const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
+
+  /// Calls f(block, threads) for all blocks < n.
+  template <class F>
+  void for_blocks(std::uint32_t n, const F& f) const {
+    for_each_nowait(n, [&](std::uint32_t block) {
+      memory_.clear();
+      f(block, Threads{*this, &memory_});
+    });
+  }
+  /// The threads of a block.
+  struct Threads {
+    const HostTeam& team;
+    std::vector<double>* memory;
+
+    void sync() const {}
+    void* shared(std::size_t bytes) const {
+      memory->resize((bytes + sizeof(double) - 1) / sizeof(double), std::nan(""));
+      return memory->data();
+    }
+    template <class F>
+    void for_each(std::uint32_t n, const F& f) const {
+      team.for_each_nowait(n, f);
+    }
+    template <class F>
+    void once(const F& f) const {
+      f();
+    }
+    /// With one thread.
+    template <class F>
+    void for_each_thread(const F& f) const {
+      f(0u, 1u, [] {});
+    }
+  };
+  void sort(std::uint32_t n, const device::SortedCodes& codes) const {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted(n);
+    for (std::uint32_t i = 0; i < n; ++i) sorted[i] = {codes.keys[i], codes.items[i]};
+    std::ranges::stable_sort(sorted, {}, [](const auto& item) { return item.first; });
+    for (std::uint32_t i = 0; i < n; ++i) {
+      std::tie(codes.keys[i], codes.items[i]) = sorted[i];
+      codes.other_keys[i] = 0, codes.other_items[i] = device::kNone;
+    }
+  }
 
   template <class F>
   void for_each_nowait(std::uint32_t n, const F& f) const {
@@ -97,6 +142,7 @@ class HostTeam {
 
  private:
   mutable std::uint64_t loops_ = 0;
+  mutable std::vector<double> memory_;  ///< shared by the threads of a block
 };
 
 class HostDevice {

@@ -1,4 +1,5 @@
 jfpx_add_test(world_parts_test THESIS INTERNAL SOURCES
+  world/blocks_test.cpp
   world/body_store_test.cpp
   world/compound_test.cpp
   world/fixed_trees_test.cpp

@@ -38,9 +38,9 @@ class Finder {
 
 }  // namespace
 
-void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls,
-                         const JointView& joints, ThreadPool* pool) {
-  reserve(inverse_mass.size());
+void ContactCache::match(const MatchedBodies& bodies, bool any_rolls, const JointView& joints,
+                         ThreadPool* pool) {
+  reserve(bodies.inverse_mass.size());
   drop_forgotten();
   ContactSet& now = current_;
   const auto spheres = static_cast<std::uint32_t>(now.spheres.size());
@@ -51,17 +51,16 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls,
     now.rolling_impulses = {};
   }
   resize_geometric(&now.colors, now.size());
-  coloring_.start(inverse_mass.size(), pool);
+  coloring_.start(bodies.inverse_mass.size(), pool);
   parallel_for(pool, spheres, kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
-    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
-                  inverse_mass);
+    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last), bodies);
   });
   parallel_for(pool, now.manifolds.size(), kMatchesPerChunk,
                [&](std::size_t first, std::size_t last) {
                  match_manifolds(static_cast<std::uint32_t>(first),
-                                 static_cast<std::uint32_t>(last), inverse_mass);
+                                 static_cast<std::uint32_t>(last), bodies);
                });
-  match_joints(joints, inverse_mass);
+  match_joints(joints, bodies);
   coloring_.finish(
       [&](std::uint32_t i, std::uint8_t color) {
         if (i < now.size()) {
@@ -73,19 +72,20 @@ void ContactCache::match(std::span<const Real> inverse_mass, bool any_rolls,
       pool);
 }
 
-void ContactCache::match_joints(const JointView& joints, std::span<const Real> inverse_mass) {
+void ContactCache::match_joints(const JointView& joints, const MatchedBodies& bodies) {
   GreedyColoring::Portion uncolored(&coloring_);
   for (std::uint32_t joint = 0; joint < joints.count; ++joint) {
     KeptJoint& now = joints.now[joint];
     now = joints.last[joint];
     if (!joints.is_used(joint)) continue;
     const ContactKey key = joints.key(joint);
-    if (now.color < kColors) {
-      coloring_.keep(key.a, key.b, static_cast<std::uint8_t>(now.color));
-    } else if (key.b != kWorld && inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0) {
-      uncolored.add(key, current_.size() + joint);
-    } else {
+    if (key.b == kWorld || !bodies.are_movable(key)) {
       now.color = kFixedColor;
+    } else if (const bool is_inner = bodies.are_in_one_block(key);
+               keeps_color(now.color, is_inner)) {
+      coloring_.keep(key.a, key.b, static_cast<std::uint8_t>(now.color));
+    } else {
+      uncolored.add(key, current_.size() + joint, is_inner);
     }
   }
   uncolored.flush();
@@ -95,7 +95,7 @@ void ContactCache::match_joints(const JointView& joints, std::span<const Real> i
 /// contact without a color gets kFixedColor, or a color from GreedyColoring::finish().
 /// @param before number in the last step, if `is_kept`
 void ContactCache::keep(std::uint32_t i, bool is_kept, std::uint32_t before,
-                        std::span<const Real> inverse_mass, GreedyColoring::Portion* uncolored) {
+                        const MatchedBodies& bodies, GreedyColoring::Portion* uncolored) {
   if (current_.has_rolling()) {
     current_.rolling_impulses[i] = {};
     if (is_kept) current_.rolling_impulses[i] = last_.rolling_impulse(before);
@@ -103,19 +103,19 @@ void ContactCache::keep(std::uint32_t i, bool is_kept, std::uint32_t before,
   const std::uint8_t color = is_kept ? last_.colors[before] : kNoColor;
   const ContactView contacts = current_.view();
   const ContactKey& key = contacts.key(i);
-  if (color < kColors) {
+  if (!bodies.are_movable(key)) {
+    current_.colors[i] = kFixedColor;
+  } else if (const bool is_inner = bodies.are_in_one_block(key); keeps_color(color, is_inner)) {
     current_.colors[i] = color;
     coloring_.keep(key.a, key.b, color);
-  } else if (!(inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0)) {
-    current_.colors[i] = kFixedColor;
   } else {
     current_.colors[i] = kNoColor;
-    uncolored->add(key, i);
+    uncolored->add(key, i, is_inner);
   }
 }
 
 void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last,
-                                 std::span<const Real> inverse_mass) {
+                                 const MatchedBodies& bodies) {
   GreedyColoring::Portion uncolored(&coloring_);
   Finder<SphereContactInput> finder(last_.spheres, current_.spheres[first].key);
   for (std::uint32_t i = first; i < last; ++i) {
@@ -123,14 +123,14 @@ void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last,
     current_.impulses[i] = {};
     std::uint32_t before = 0;
     const bool is_kept = finder.find(contact.key, &before);
-    keep(i, is_kept, before, inverse_mass, &uncolored);
+    keep(i, is_kept, before, bodies, &uncolored);
     if (is_kept) current_.impulses[i] = at_start_of_step(last_.impulses[before]);
   }
   uncolored.flush();
 }
 
 void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last,
-                                   std::span<const Real> inverse_mass) {
+                                   const MatchedBodies& bodies) {
   GreedyColoring::Portion uncolored(&coloring_);
   const auto spheres = static_cast<std::uint32_t>(current_.spheres.size());
   const auto spheres_before = static_cast<std::uint32_t>(last_.spheres.size());
@@ -142,7 +142,7 @@ void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last,
     }
     std::uint32_t old = 0;
     const bool is_kept = finder.find(contact.key, &old);
-    keep(spheres + m, is_kept, spheres_before + old, inverse_mass, &uncolored);
+    keep(spheres + m, is_kept, spheres_before + old, bodies, &uncolored);
     if (is_kept) match_points(current_.view(), m, last_.view(), old);
   }
   uncolored.flush();

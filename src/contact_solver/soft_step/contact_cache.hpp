@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/base/thread_pool.hpp"
+#include "src/contact_solver/soft_step/blocks.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/contact_solver/soft_step/joint_set.hpp"
@@ -13,6 +14,21 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
+
+/// What the matching of contacts reads of the bodies.
+struct MatchedBodies {
+  std::span<const Real> inverse_mass;     ///< by body [1/kg]; 0: immovable or kinematic
+  std::span<const std::uint32_t> places;  ///< by body, in the partition into blocks
+  bool has_blocks = false;                ///< whether the world has several blocks
+
+  bool are_movable(const ContactKey& key) const {
+    return inverse_mass[key.a] > 0 && inverse_mass[key.b] > 0;
+  }
+  /// Whether the row of a contact of two bodies is an inner row.
+  bool are_in_one_block(const ContactKey& key) const {
+    return is_inner(has_blocks, places[key.a], places[key.b]);
+  }
+};
 
 /// Owns the contacts of two steps. Buffers grow and never shrink.
 class ContactCache {
@@ -31,10 +47,10 @@ class ContactCache {
 
   /// Assigns to each contact and joint its impulses and color of the last step, and colors the new
   /// ones.
-  /// @param inverse_mass by body [1/kg]; 0: immovable or kinematic
+  /// @param bodies of the step; their arrays are used during the call
   /// @param any_rolls whether a body has rolling or spinning friction
   /// @param pool null: in the calling thread
-  void match(std::span<const Real> inverse_mass, bool any_rolls, const JointView& joints,
+  void match(const MatchedBodies& bodies, bool any_rolls, const JointView& joints,
              ThreadPool* pool);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
@@ -53,10 +69,10 @@ class ContactCache {
   void replace_last(ContactSet last) noexcept { last_ = std::move(last); }
 
  private:
-  void match_spheres(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
-  void match_manifolds(std::uint32_t first, std::uint32_t last, std::span<const Real> inverse_mass);
-  void match_joints(const JointView& joints, std::span<const Real> inverse_mass);
-  void keep(std::uint32_t i, bool is_kept, std::uint32_t before, std::span<const Real> inverse_mass,
+  void match_spheres(std::uint32_t first, std::uint32_t last, const MatchedBodies& bodies);
+  void match_manifolds(std::uint32_t first, std::uint32_t last, const MatchedBodies& bodies);
+  void match_joints(const JointView& joints, const MatchedBodies& bodies);
+  void keep(std::uint32_t i, bool is_kept, std::uint32_t before, const MatchedBodies& bodies,
             GreedyColoring::Portion* uncolored);
 
   ContactSet current_, last_;

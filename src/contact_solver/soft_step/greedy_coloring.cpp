@@ -27,7 +27,7 @@ std::size_t bucket_of(std::uint64_t order) { return order >> (64 - kBucketBits);
 void GreedyColoring::start(std::size_t bodies, ThreadPool* pool) {
   resize_geometric(&used_, bodies);
   parallel_for(pool, bodies, kBodiesPerChunk, [this](std::size_t first, std::size_t last) {
-    std::ranges::fill(std::span(used_).subspan(first, last - first), std::uint64_t{0});
+    std::ranges::fill(std::span(used_).subspan(first, last - first), UsedColors{});
   });
   uncolored_.clear();
 }

@@ -16,8 +16,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// Number of colors. Contacts without a free color get kOverflowColor and are solved serially.
-inline constexpr std::uint8_t kColors = 64;
+/// Number of colors of a class. The classes are inner rows and crossing rows (see blocks.hpp).
+inline constexpr std::uint8_t kColorsPerClass = 64;
+/// Number of colors: first those of inner rows, then those of crossing rows. Contacts without a
+/// free color get kOverflowColor and are solved serially.
+inline constexpr std::uint8_t kColors = 2 * kColorsPerClass;
 inline constexpr std::uint8_t kOverflowColor = kColors;
 /// Color of a contact with an immovable or kinematic body, which needs no color.
 inline constexpr std::uint8_t kFixedColor = 254;
@@ -38,20 +41,50 @@ JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
   return mixed(mixed(bodies + 0x9e3779b97f4a7c15u) ^ parts);
 }
 
-/// The lowest color that is not in a set of colors; kOverflowColor if all are.
-JFPX_HD inline std::uint8_t lowest_free_color(std::uint64_t used) {
-  static_assert(kColors == 64 && kOverflowColor == 64);
+/// Whether a color below kColors is one of inner rows.
+JFPX_HD constexpr bool is_inner_color(std::uint32_t color) { return color < kColorsPerClass; }
+/// Number of a color below kColors in its class.
+JFPX_HD constexpr std::uint32_t number_in_class(std::uint32_t color) {
+  return color % kColorsPerClass;
+}
+
+/// The colors of a body: a set of numbers for each class.
+struct UsedColors {
+  std::uint64_t inner = 0, crossing = 0;
+
+  JFPX_HD constexpr std::uint64_t& of_class(bool is_inner) { return is_inner ? inner : crossing; }
+};
+
+/// The lowest number that is not in a set of numbers; kColorsPerClass if all are.
+JFPX_HD inline std::uint32_t lowest_free(std::uint64_t used) {
+  static_assert(kColorsPerClass == 64);
 #if defined(__CUDA_ARCH__)
-  return static_cast<std::uint8_t>(__popcll(used & ~(used + 1)));
+  return static_cast<std::uint32_t>(__popcll(used & ~(used + 1)));
 #else
-  return static_cast<std::uint8_t>(std::countr_one(used));
+  return static_cast<std::uint32_t>(std::countr_one(used));
 #endif
 }
 
-/// Assigns to each new contact the lowest color that neither body has, in the order of a hash of
-/// the key. The order depends on the keys only, and random orders need few parallel rounds
-/// (Blelloch, Fineman and Shun 2012). A persistent contact keeps its color, except in the overflow,
-/// whose contacts are colored again.
+/// Adds the lowest color of a class that two bodies do not have to both of them. @returns the
+/// color, or kOverflowColor if there is none
+JFPX_HD inline std::uint8_t take_lowest_color(bool is_inner, UsedColors* of_a, UsedColors* of_b) {
+  std::uint64_t &a = of_a->of_class(is_inner), &b = of_b->of_class(is_inner);
+  const std::uint32_t number = lowest_free(a | b);
+  if (number == kColorsPerClass) return kOverflowColor;
+  a |= std::uint64_t{1} << number;
+  b |= std::uint64_t{1} << number;
+  return static_cast<std::uint8_t>(is_inner ? number : kColorsPerClass + number);
+}
+
+/// Whether a contact keeps the color of the last step: it has one, and it is of the same class.
+JFPX_HD constexpr bool keeps_color(std::uint32_t color, bool is_inner) {
+  return color < kColors && is_inner_color(color) == is_inner;
+}
+
+/// Assigns to each new contact the lowest color of its class that neither body has, in the order of
+/// a hash of the key. The order depends on the keys only, and random orders need few parallel
+/// rounds (Blelloch, Fineman and Shun 2012). A persistent contact keeps its color while its class
+/// is the same, except in the overflow, whose contacts are colored again.
 ///
 /// Usage in a step: start(), keep() for all colored contacts, Portion::add() for all others,
 /// finish(). Joints are colored together with the contacts, in the order of the same hash, and
@@ -62,9 +95,11 @@ class GreedyColoring {
   void start(std::size_t bodies, ThreadPool* pool);
   /// Several threads may call it concurrently.
   void keep(std::uint32_t a, std::uint32_t b, std::uint8_t color) {
-    const std::uint64_t bit = std::uint64_t{1} << color;
-    std::atomic_ref(used_[a]).fetch_or(bit, std::memory_order_relaxed);
-    std::atomic_ref(used_[b]).fetch_or(bit, std::memory_order_relaxed);
+    const std::uint64_t bit = std::uint64_t{1} << number_in_class(color);
+    for (const std::uint32_t body : {a, b}) {
+      std::atomic_ref(used_[body].of_class(is_inner_color(color)))
+          .fetch_or(bit, std::memory_order_relaxed);
+    }
   }
   /// Contacts that one thread adds, in portions. Several threads may add contacts concurrently,
   /// each with its own object.
@@ -74,12 +109,8 @@ class GreedyColoring {
   void finish(const Assign& assign, ThreadPool* pool) {
     sort(pool);
     for (const Uncolored& contact : sorted_) {
-      std::uint64_t &a = used_[contact.a], &b = used_[contact.b];
-      const std::uint8_t color = lowest_free_color(a | b);
-      assign(contact.contact, color);
-      if (color == kOverflowColor) continue;
-      a |= std::uint64_t{1} << color;
-      b |= std::uint64_t{1} << color;
+      assign(contact.contact,
+             take_lowest_color(contact.is_inner, &used_[contact.a], &used_[contact.b]));
     }
   }
 
@@ -87,12 +118,13 @@ class GreedyColoring {
   struct Uncolored {
     std::uint64_t order;
     std::uint32_t contact, a, b;
+    bool is_inner;
   };
   void append(std::span<const Uncolored> contacts);
   void sort(ThreadPool* pool);
 
-  std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
-  std::mutex mutex_;                 ///< guards uncolored_
+  std::vector<UsedColors> used_;  ///< by body
+  std::mutex mutex_;              ///< guards uncolored_
   std::vector<Uncolored> uncolored_;
   std::vector<Uncolored> sorted_;  ///< by order and number
 };
@@ -101,9 +133,9 @@ class GreedyColoring::Portion {
  public:
   explicit Portion(GreedyColoring* coloring) : coloring_(coloring) {}
   /// @param contact number of the contact
-  void add(const ContactKey& key, std::uint32_t contact) {
+  void add(const ContactKey& key, std::uint32_t contact, bool is_inner) {
     if (count_ == contacts_.size()) flush();
-    contacts_[count_++] = {color_order(key), contact, key.a, key.b};
+    contacts_[count_++] = {color_order(key), contact, key.a, key.b, is_inner};
   }
   /// Must be called after the last add().
   void flush() {

@@ -63,11 +63,13 @@ JFPX_HD constexpr decltype(auto) visit_row(RowKind kind, const F& f) {
   return f(std::type_identity<std::tuple_element_t<kFirst, RowTypes>>());
 }
 
-/// Groups of rows, which a sweep solves one after the other: rows without a color, rows of each
-/// color, and rows with an immovable or kinematic body or with the world.
-inline constexpr std::uint32_t kGroups = kColors + 2u;
+/// Groups of rows, which a sweep solves one after the other: rows without a color, inner rows, the
+/// crossing rows of each color, and rows with an immovable or kinematic body or with the world.
+/// Inner rows have no group here, because each block has its own rows.
+inline constexpr std::uint32_t kGroups = kColorsPerClass + 2u;
 inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
-JFPX_HD constexpr std::uint32_t group_of_color(std::uint32_t color) { return 1 + color; }
+/// Group of a crossing row. @param number of its color in the class
+JFPX_HD constexpr std::uint32_t group_of_crossing(std::uint32_t number) { return 1 + number; }
 
 /// Rows are sorted into bins by kind, then by group.
 inline constexpr std::uint32_t kBins = kRowKinds * kGroups;

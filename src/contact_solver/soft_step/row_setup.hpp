@@ -89,10 +89,14 @@ struct RowSetup {
     return (a & b & BodyTraits::kIsRound) != 0 ? kKindOf<SphereRow> : kKindOf<ManifoldRow>;
   }
 
-  JFPX_HD std::uint32_t group_of(std::uint32_t i) const {
-    const std::uint32_t color = is_joint(i) ? joints.now[joint_of(i)].color : contacts.colors[i];
+  /// The color of a contact or joint: below kColors, kOverflowColor or kFixedColor.
+  JFPX_HD std::uint32_t color_of(std::uint32_t i) const {
+    return is_joint(i) ? joints.now[joint_of(i)].color : contacts.colors[i];
+  }
+  /// Group of a row that is not an inner row.
+  JFPX_HD static std::uint32_t group_of(std::uint32_t color) {
     if (color == kFixedColor) return kFixedGroup;
-    return color == kOverflowColor ? kOverflowGroup : group_of_color(color);
+    return color == kOverflowColor ? kOverflowGroup : group_of_crossing(number_in_class(color));
   }
 
   /// Rebound speed after an impact, or 0. The speed of the impact is that at the start of the step
@@ -227,8 +231,11 @@ struct RowSetup {
   }
 
   /// Writes the impulses of a row to its contact or joint.
-  JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact) const {
-    const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
+  JFPX_HD void store(const SphereRow& row, const NoPart* none, std::uint32_t contact) const {
+    store(row, none, contact, contacts.key(contact).a == row.a ? Real(1) : Real(-1));
+  }
+  /// @param side -1 if the row exchanges the bodies of the contact, otherwise 1
+  JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact, Real side) const {
     const Real impulse = normal_impulse_of(row);
     const bool is_released = !(impulse > 0) && has_pushed(row);
     contacts.impulses[contacts.first_impulse(contact)] = {

@@ -38,8 +38,9 @@ struct MotionColumns {
   /// [m^2/s^2], recency-weighted mean of v^2 + w^2, compared with SleepSettings::epsilon (thesis
   /// 4.4.2)
   Column<Real> mean_motion{};
-  Column<Real> rest_time{};      ///< [s], for which the body has been slow; soft_step
-  Column<std::uint8_t> awake{};  ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
+  Column<Real> rest_time{};       ///< [s], for which the body has been slow; soft_step
+  Column<std::uint8_t> awake{};   ///< 1 or 0; a body of mass 0: 1 if kinematic and moving
+  Column<std::uint32_t> place{};  ///< in the partition into blocks (partition.hpp), or kNoPlace
 };
 
 /// Properties, which a step reads and does not change.
@@ -109,6 +110,7 @@ JFPX_HD constexpr void each_other_motion(const Visit& visit, Columns&... columns
   visit(columns.mean_motion...);
   visit(columns.rest_time...);
   visit(columns.awake...);
+  visit(columns.place...);
 }
 template <class Visit, class... Columns>
 JFPX_HD constexpr void each_motion(const Visit& visit, Columns&... columns) {

@@ -5,6 +5,7 @@
 
 #include "src/base/power.hpp"
 #include "src/base/reserve.hpp"
+#include "src/contact_solver/soft_step/blocks.hpp"
 #include "src/scene/compound.hpp"
 #include "src/scene/inertia.hpp"
 #include "src/scene/inertia_tensor.hpp"
@@ -49,6 +50,8 @@ struct PutValue {
 };
 
 }  // namespace
+
+std::atomic<std::uint32_t> BodyStore::most_in_one_block = soft_step::kMostBodiesInOneBlock;
 
 BodyStore::BodyStore(Real dt, const SleepSettings& sleep, std::uint32_t substeps)
     : dt_(dt), substep_(dt / static_cast<Real>(substeps)), sleep_(sleep) {}
@@ -144,6 +147,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.mean_motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
+  moving.place[i] = soft_step::kNoPlace;
   if (!movable(i)) ++fixed_version_;
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
   return id;
@@ -337,6 +341,8 @@ BodyView BodyStore::view_without_ids() const {
   view.filters_in_use = filters_in_use_;
   view.count = static_cast<std::uint32_t>(size());
   view.capacity = static_cast<std::uint32_t>(capacity());
+  view.movable_count = movable_count_;
+  view.has_blocks = has_blocks();
   view.dt = dt_;
   view.substep = substep_;
   view.sleep_speed = sleep_.speed;

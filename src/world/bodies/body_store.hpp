@@ -7,6 +7,7 @@
 #include "src/world/bodies/id_pool.hpp"
 #include "src/world/bodies/ignored_pairs.hpp"
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -53,6 +54,11 @@ class BodyStore {
   /// Number of slots; all indices are below it.
   std::size_t capacity() const noexcept { return pool_.capacity(); }
   std::uint32_t movable_count() const noexcept { return movable_count_; }
+  /// Whether the solver divides the world into several blocks
+  /// (contact_solver/soft_step/blocks.hpp).
+  bool has_blocks() const noexcept { return movable_count_ > most_in_one_block.load(); }
+  /// soft_step::kMostBodiesInOneBlock; tests set it to a low value.
+  static std::atomic<std::uint32_t> most_in_one_block;
   /// Never 0. Changes when a body of mass 0 is added or removed, or set_state() moves an immovable
   /// body.
   std::uint64_t fixed_version() const noexcept { return fixed_version_; }
@@ -62,6 +68,12 @@ class BodyStore {
   /// Reads what write() has written, into an empty store. The store must not be used if it throws.
   /// @throws InvalidSnapshot; InvalidScene for a body that add() must not receive; std::bad_alloc
   void read(BinaryReader* reader);
+  /// Whether a body has a place in the partition into blocks.
+  bool has_places() const noexcept;
+  /// Writes the places of all bodies.
+  void write_places(BinaryWriter* writer) const;
+  /// Reads what write_places() has written, after read(). @throws InvalidSnapshot, std::bad_alloc
+  void read_places(BinaryReader* reader);
   /// Whether a body has the index.
   bool lives(std::uint32_t body) const noexcept { return pool_.is_used(body); }
 

@@ -27,10 +27,12 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   const BodyId* ids = nullptr;  ///< of the living bodies, sorted by index
   std::uint32_t count = 0;      ///< number of ids
   std::uint32_t capacity = 0;   ///< number of slots
-  Real dt = 0, substep = 0;     ///< [s]
-  Real sleep_speed = 0;         ///< [m/s]
-  Real sleep_time = 0;          ///< [s]
-  Real woken_motion = 0;        ///< [m^2/s^2], mean motion of a body that wakes
+  std::uint32_t movable_count = 0;
+  bool has_blocks = false;   ///< BodyStore::has_blocks()
+  Real dt = 0, substep = 0;  ///< [s]
+  Real sleep_speed = 0;      ///< [m/s]
+  Real sleep_time = 0;       ///< [s]
+  Real woken_motion = 0;     ///< [m^2/s^2], mean motion of a body that wakes
 
   JFPX_HD bool movable(std::uint32_t i) const { return inverse_mass[i] > 0; }
   /// Whether the body is movable and awake.

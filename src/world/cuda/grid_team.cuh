@@ -11,6 +11,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
+/// Shared memory of a block, with the alignment of four numbers.
+struct alignas(4 * sizeof(Real)) SharedPiece {
+  Real numbers[4];
+};
+
 /// Loops over items. All threads must call the same functions with the same item counts. scan() and
 /// partition() assign consecutive chunks of items to the blocks.
 class GridTeam {
@@ -19,7 +24,7 @@ class GridTeam {
 
   /// Words of scratch memory for a launch with this number of blocks.
   static std::size_t scratch_words(unsigned blocks) {
-    return std::size_t{blocks} * (2 + device::kBins);
+    return std::size_t{blocks} * (2 + std::max<std::size_t>(device::kBins, kDigits));
   }
 
   /// @param scratch device memory of scratch_words()
@@ -60,6 +65,59 @@ class GridTeam {
     return copy;
 #else
     return numbers;
+#endif
+  }
+
+  /// The threads of a block.
+  class Threads {
+   public:
+    JFPX_HD void sync() const {
+#if defined(__CUDA_ARCH__)
+      __syncthreads();
+#endif
+    }
+    /// Memory that the threads share: at most Program::kSharedBytes.
+    JFPX_HD void* shared(std::size_t) const {
+#if defined(__CUDA_ARCH__)
+      extern __shared__ SharedPiece shared_memory[];
+      return shared_memory;
+#else
+      return nullptr;
+#endif
+    }
+    /// Calls f(i) for all i < n, in any order, without a barrier.
+    template <class F>
+    JFPX_HD void for_each(std::uint32_t n, const F& f) const {
+#if defined(__CUDA_ARCH__)
+      for (std::uint32_t i = threadIdx.x; i < n; i += kThreads) f(i);
+#endif
+    }
+    /// Calls f in one thread, without a barrier.
+    template <class F>
+    JFPX_HD void once(const F& f) const {
+#if defined(__CUDA_ARCH__)
+      if (threadIdx.x == 0) f();
+#endif
+    }
+    /// Calls f(thread, number of threads, sync) in each thread; all must call sync() equally often.
+    template <class F>
+    [[gnu::always_inline]] JFPX_HD void for_each_thread(const F& f) const {
+#if defined(__CUDA_ARCH__)
+      f(threadIdx.x, kThreads, [] { __syncthreads(); });
+#endif
+    }
+  };
+
+  /// Calls f(block, threads) for all blocks < n of a partition of work, in ascending order, each
+  /// with the threads of one block of the launch. All calls with the same n assign a block to the
+  /// same threads. The threads of a block wait for each other, but not for other blocks.
+  template <class F>
+  [[gnu::always_inline]] JFPX_HD void for_blocks(std::uint32_t n, const F& f) const {
+#if defined(__CUDA_ARCH__)
+    for (std::uint32_t block = block_; block < n; block += blocks_) {
+      f(block, Threads());
+      __syncthreads();
+    }
 #endif
   }
 
@@ -213,8 +271,94 @@ class GridTeam {
 #endif
   }
 
- private:
+  /// Sorts keys and items by key; equal keys keep their order. A radix sort with one pass per digit
+  /// of eight bits, except digits that all keys share.
+  JFPX_HD void sort(std::uint32_t n, const device::SortedCodes& codes) const {
 #if defined(__CUDA_ARCH__)
+    device::SortedCodes from = codes;
+    for (unsigned shift = 0; shift < 64; shift += 8) {
+      if (!sort_by_digit(n, from, shift)) continue;
+      from = {from.other_keys, from.keys, from.other_items, from.items};
+    }
+    if (from.items == codes.items) return;
+    for_each(n, [&](std::uint32_t i) {
+      codes.keys[i] = codes.other_keys[i];
+      codes.items[i] = codes.other_items[i];
+    });
+#else
+    static_cast<void>(n);
+    static_cast<void>(codes);
+#endif
+  }
+
+ private:
+  static constexpr unsigned kDigits = 256;  ///< of the radix sort
+
+#if defined(__CUDA_ARCH__)
+  /// One pass of the radix sort. @returns false, without effect, if all keys share the digit
+  __device__ bool sort_by_digit(std::uint32_t n, const device::SortedCodes& codes,
+                                unsigned shift) const {
+    static_assert(kThreads == kDigits);
+    constexpr unsigned kWarps = kThreads / 32;
+    __shared__ std::uint32_t next[kDigits];
+    __shared__ std::uint32_t of_warp[kWarps][kDigits];
+    const unsigned digit_of_thread = threadIdx.x, warp = threadIdx.x / 32;
+    const auto digit_of = [&](std::uint64_t key) {
+      return static_cast<unsigned>(key >> shift) % kDigits;
+    };
+    const device::Range chunk = chunk_of(n);
+    next[digit_of_thread] = 0;
+    __syncthreads();
+    for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
+      atomicAdd(&next[digit_of(codes.keys[i])], 1u);
+    }
+    __syncthreads();
+    block_bins_[block_ * kDigits + digit_of_thread] = next[digit_of_thread];
+    sync();
+    std::uint32_t total = 0, before = 0;
+    for (std::uint32_t block = 0; block < blocks_; ++block) {
+      if (block == block_) before = total;
+      total += block_bins_[block * kDigits + digit_of_thread];
+    }
+    std::uint32_t sum = 0;
+    const std::uint32_t first = block_scan(total, &sum);
+    const bool is_shared = __syncthreads_or(total == n) != 0;
+    if (is_shared) {
+      sync();
+      return false;
+    }
+    next[digit_of_thread] = first + before;
+    for (std::uint32_t tile = chunk.begin; tile < chunk.end; tile += kThreads) {
+      for (unsigned w = 0; w < kWarps; ++w) of_warp[w][digit_of_thread] = 0;
+      __syncthreads();
+      const std::uint32_t i = tile + threadIdx.x;
+      const bool is_item = i < chunk.end;
+      const std::uint64_t key = is_item ? codes.keys[i] : 0;
+      // Threads without an item have a digit of their own.
+      const unsigned digit = is_item ? digit_of(key) : kDigits;
+      const unsigned same = __match_any_sync(kFullWarp, digit);
+      const unsigned rank = __popc(same & lanes_below());
+      if (is_item && rank == 0) of_warp[warp][digit] = __popc(same);
+      __syncthreads();
+      std::uint32_t at = next[digit_of_thread];
+      for (unsigned w = 0; w < kWarps; ++w) {
+        const std::uint32_t count = of_warp[w][digit_of_thread];
+        of_warp[w][digit_of_thread] = at;
+        at += count;
+      }
+      next[digit_of_thread] = at;
+      __syncthreads();
+      if (is_item) {
+        const std::uint32_t to = of_warp[warp][digit] + rank;
+        codes.other_keys[to] = key;
+        codes.other_items[to] = codes.items[i];
+      }
+      __syncthreads();
+    }
+    sync();
+    return true;
+  }
+
   __device__ std::uint32_t first() const { return block_ * kThreads + threadIdx.x; }
 
   /// The chunk of items of this block.

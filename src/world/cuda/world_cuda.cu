@@ -150,6 +150,7 @@ class CudaDevice {
     cudaLaunchConfig_t config{};
     config.gridDim = blocks;
     config.blockDim = GridTeam::kThreads;
+    config.dynamicSmemBytes = shared_bytes<Program>();
     config.stream = target_;
     config.attrs = &attribute;
     config.numAttrs = 1;
@@ -211,14 +212,25 @@ class CudaDevice {
     bool has_clusters = false;
   };
 
+  /// Bytes of shared memory of a block.
+  template <class Program>
+  static constexpr std::size_t shared_bytes() {
+    if constexpr (requires { Program::kSharedBytes; }) return Program::kSharedBytes;
+    return 0;
+  }
+
   template <class Program>
   const Launch& limits_of() {
     static_assert(Program::kBlocksPerMultiprocessor <= tuning::kMost);
     Launch& limits = std::get<Limits<Program>>(limits_);
     if (limits.most_blocks > 0) return limits;
     int resident = 0;
+    constexpr std::size_t kShared = shared_bytes<Program>();
+    JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
+                                       cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                       static_cast<int>(kShared)));
     JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, run_program<Program>,
-                                                                GridTeam::kThreads, 0));
+                                                                GridTeam::kThreads, kShared));
     limits.has_clusters = has_hopper_code();
     if (limits.has_clusters) {
       JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
@@ -253,7 +265,10 @@ class CudaDevice {
              Limits<device::SphereProgram>, Limits<device::ShapeProgram>,
              Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
              Limits<device::SolveProgram<soft_step::kContactRowKinds>>,
-             Limits<device::SolveProgram<soft_step::kRowKinds>>, Limits<device::CommitProgram>,
+             Limits<device::SolveProgram<soft_step::kRowKinds>>,
+             Limits<device::BlockSolveProgram<device::kSphereRowKinds>>,
+             Limits<device::BlockSolveProgram<soft_step::kContactRowKinds>>,
+             Limits<device::BlockSolveProgram<soft_step::kRowKinds>>, Limits<device::CommitProgram>,
              Limits<device::EditProgram>, Limits<device::MergeProgram>>
       limits_;
 };

@@ -14,19 +14,22 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Tickets: sequence numbers of the updates of a body. Each sweep has kPerSweep tickets: 1 + c for
-/// the row of color c, and the last one for the body itself, with its rows with fixed bodies. A row
-/// waits for the ticket of the previous row of the body, then publishes its own ticket. Colors
-/// without a row of the body have no tickets. Overflow rows do not change the ticket, because
-/// barriers enclose them.
+/// Tickets: sequence numbers of the updates of a body. Each sweep has kPerSweep tickets: one before
+/// the overflow, one before the colors, and one for the row of each color. A row waits for the
+/// ticket of the previous row of the body, then publishes its own ticket. Colors without a row of
+/// the body have no tickets. Overflow rows do not change the ticket, because barriers enclose them.
+/// In a world with blocks, the colors are those of crossing rows, which inner rows precede.
 struct Tickets {
-  static constexpr std::uint32_t kPerSweep = soft_step::kColors + 2u;
+  static constexpr std::uint32_t kPerSweep = soft_step::kColorsPerClass + 2u;
 
   std::uint64_t colors = 0;  ///< of the body's rows
-  std::uint32_t first = 0;   ///< the ticket before the sweep
+  std::uint32_t first = 0;   ///< the ticket before the colors
 
   JFPX_HD Tickets(std::uint32_t sweep, std::uint64_t row_colors)
-      : colors(row_colors), first(sweep * kPerSweep) {}
+      : colors(row_colors), first(sweep * kPerSweep + 1) {}
+
+  /// The ticket before the overflow rows of a sweep.
+  JFPX_HD static std::uint32_t before_sweep(std::uint32_t sweep) { return sweep * kPerSweep; }
 
   /// The ticket after the row of a color.
   JFPX_HD std::uint32_t after(std::uint32_t color) const { return first + 1 + color; }
@@ -34,9 +37,8 @@ struct Tickets {
   JFPX_HD std::uint32_t before(std::uint32_t color) const {
     return after_all(colors & ((std::uint64_t{1} << color) - 1));
   }
-  /// The ticket that the body waits for.
-  JFPX_HD std::uint32_t before_body() const { return after_all(colors); }
-  JFPX_HD std::uint32_t after_body() const { return first + kPerSweep; }
+  /// The last ticket of the sweep.
+  JFPX_HD std::uint32_t last() const { return after_all(colors); }
 
  private:
   JFPX_HD std::uint32_t after_all(std::uint64_t set) const {
@@ -138,9 +140,23 @@ class OrientationCells {
 /// versions of the matching other cells.
 class BodyCells {
  public:
+  static constexpr std::uint32_t kTicketBits = 14, kVersionBits = 6;
+  static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
+
   /// Versions of the other vectors.
   struct Version {
     std::uint32_t shift = 0, rotation = 0, free = 0;
+
+    Version() = default;
+    /// @param word of the cells of velocities
+    JFPX_HD explicit Version(std::uint32_t word)
+        : shift(word >> kTicketBits & kVersionMask),
+          rotation(word >> (kTicketBits + kVersionBits) & kVersionMask),
+          free(word >> (kTicketBits + 2 * kVersionBits) & kVersionMask) {}
+    JFPX_HD std::uint32_t word(std::uint32_t ticket) const {
+      return ticket | shift << kTicketBits | rotation << (kTicketBits + kVersionBits) |
+             free << (kTicketBits + 2 * kVersionBits);
+    }
   };
 
   JFPX_HD BodyCells(MotionCells* motion, FreeCells* free) : motion_(motion), free_(free) {}
@@ -151,7 +167,7 @@ class BodyCells {
     write_shift(body, &version);
     write_rotation(body, &version);
     write_free(free, &version);
-    write(0, body, version);
+    write(Tickets(0, 0).first, body, version);
   }
 
   /// Reads the motion after a ticket.
@@ -169,9 +185,7 @@ class BodyCells {
     body->shift = s.vector();
     if constexpr (kRotation) body->rotation = r.vector();
     const std::uint32_t word = v.word();
-    version->shift = word >> kTicketBits & kVersionMask;
-    version->rotation = word >> (kTicketBits + kVersionBits) & kVersionMask;
-    version->free = word >> (kTicketBits + 2 * kVersionBits) & kVersionMask;
+    *version = Version(word);
     bool is_complete =
         (word & kTicketMask) == ticket && w.word() == word && s.word() == version->shift;
     if constexpr (kRotation) is_complete = r.word() == version->rotation && is_complete;
@@ -181,9 +195,7 @@ class BodyCells {
   /// Writes the velocities after a ticket. @param version of the other vectors
   JFPX_HD void write(std::uint32_t ticket, const soft_step::SolverBody& body,
                      const Version& version) const {
-    const std::uint32_t word = ticket | version.shift << kTicketBits |
-                               version.rotation << (kTicketBits + kVersionBits) |
-                               version.free << (kTicketBits + 2 * kVersionBits);
+    const std::uint32_t word = version.word(ticket);
     VectorCells(body.velocity, word).store(&motion_->velocity);
     VectorCells(body.angular_velocity, word).store(&motion_->angular_velocity);
   }
@@ -213,9 +225,7 @@ class BodyCells {
   }
 
  private:
-  static constexpr std::uint32_t kTicketBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kTicketMask = (1u << kTicketBits) - 1;
-  static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
   // Versions restart at 0 after 64 changes. A thread loads all cells of a body in immediate
   // succession, and each change takes at least a round trip to L2, so a loaded cell is less than 64
   // changes older than another.
@@ -230,9 +240,9 @@ class BodyCells {
 
 /// Constants of a body during a step, for its rows.
 struct alignas(16) RowBody {
-  Real inverse_mass = 0;     ///< as SolverBody
+  Real inverse_mass = 0;     ///< as SolverBody; 0 if the body is asleep
   Real inverse_inertia = 0;  ///< as SolverBody
-  std::uint64_t colors = 0;  ///< of the rows of its contacts
+  std::uint64_t colors = 0;  ///< of its rows
 };
 
 }  // namespace device

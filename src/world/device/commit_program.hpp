@@ -1,6 +1,8 @@
 /// End of a soft step on a device.
 #pragma once
 
+#include "src/base/atomic.hpp"
+#include "src/world/bodies/partition.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/device/step_data.hpp"
 
@@ -22,6 +24,8 @@ struct CommitProgram {
       return;
     }
     const BodyView& bodies = d.step.bodies;
+    const Progress& progress = d.counters->progress;
+    const std::uint64_t steps = progress.offset + progress.completed;  // before complete()
     const soft_step::ContactView contacts = d.contacts();  // before complete() changes the parity
     Vec3* const position_before = d.now().position_before;
     team.for_each(bodies.count, [&](std::uint32_t i) {
@@ -40,10 +44,39 @@ struct CommitProgram {
       const std::uint32_t begun = soft_step::count_begun(contacts, contacts.sphere_count + m);
       if (begun > 0) atomic_add(&d.counters->begun_points, begun);
     });
+    if (bodies.has_blocks &&
+        partition::is_due(steps, bodies.movable_count, d.counters->without_place)) {
+      team.sync();
+      if (d.counters->awake > 0) renew_partition(team);
+    }
     team.once([&] { complete(); });
   }
 
  private:
+  /// Device version of Partition::update().
+  template <class Team>
+  JFPX_HD void renew_partition(const Team& team) const {
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    const auto body = [&](std::uint32_t i) { return bodies.ids[i].index; };
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      if (!bodies.movable(body(i))) return;
+      raise(&d.counters->largest_coordinate,
+            std::uint64_t{partition::magnitude_of(bodies.position[body(i)])});
+    });
+    const partition::Grid grid(static_cast<partition::Magnitude>(d.counters->largest_coordinate));
+    const SortedCodes& codes = d.codes;
+    // Codes have 63 bits, so bodies of mass 0 are last.
+    team.for_each(bodies.count, [&](std::uint32_t i) {
+      const bool is_movable = bodies.movable(body(i));
+      codes.keys[i] = is_movable ? grid.code(bodies.position[body(i)]) : ~std::uint64_t{0};
+      codes.items[i] = body(i);
+    });
+    team.sort(bodies.count, codes);
+    team.for_each_nowait(bodies.movable_count,
+                         [&](std::uint32_t i) { d.step.motion.place[codes.items[i]] = i; });
+  }
+
   JFPX_HD void complete() const {
     const Counters& c = *data.counters;
     Progress& progress = data.counters->progress;

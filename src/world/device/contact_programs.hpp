@@ -24,9 +24,14 @@ struct BoundsProgram {
     const BodyView& bodies = d.step.bodies;
     if (!is_started) start_counters(team, d);
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
+    if (bodies.has_blocks && d.world_joints.count > 0) {
+      team.for_each_nowait(d.first_without_place() / kBodiesPerBlock,
+                           [&](std::uint32_t block) { d.first_inner_joint[block] = kNone; });
+    }
     team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.is_asleep(body)) d.counters->any_asleep = 1;
+      if (bodies.has_blocks && bodies.movable(body)) put_into_block(body);
     });
     team.for_each_nowait(d.swept_bounds.sub_shapes.ranges.bounded(), [&](std::uint32_t i) {
       d.swept_bounds.sub_shapes.update_pose(bodies, i);
@@ -52,13 +57,25 @@ struct BoundsProgram {
     }
   }
 
+  JFPX_HD void put_into_block(std::uint32_t body) const {
+    const StepData& d = data;
+    const std::uint32_t place = d.step.bodies.place[body];
+    if (place == soft_step::kNoPlace) {
+      d.body_at[d.first_without_place() + atomic_add(&d.counters->without_place, 1)] = body;
+    } else {
+      d.body_at[place] = body;
+      raise(&d.counters->places, place + 1);
+    }
+  }
+
   JFPX_HD void start(std::uint32_t body) const {
     const StepData& d = data;
     if (!is_started) save(d, body);
     d.motion[body] = d.step.bodies.predicted_motion(body);
     d.first_candidate[body] = kNone;
     d.manifold_sizes[body] = 0;
-    d.used_colors[body] = 0;
+    d.used_colors[body] = {};
+    if (d.step.bodies.has_blocks) d.body_at[body] = kNone;
     d.first_order[body] = ~std::uint64_t{0};
     d.first_contact[body] = kNone;
     d.constrained[body] = 0;

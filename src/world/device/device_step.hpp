@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/world/device/block_solve_program.hpp"
 #include "src/world/device/body_buffers.hpp"
 #include "src/world/device/commit_program.hpp"
 #include "src/world/device/contact_buffers.hpp"
@@ -93,6 +94,7 @@ class DeviceStep final : public DeviceWorld {
     // Steps that are captured must not load a program.
     if (!had_joints && data_.world_joints.count > 0) {
       device_->template load<SolveProgram<soft_step::kRowKinds>>();
+      device_->template load<BlockSolveProgram<soft_step::kRowKinds>>();
     }
     is_ready_ = false;
     ++changes_;
@@ -139,6 +141,8 @@ class DeviceStep final : public DeviceWorld {
       ++changes_;
     }
     to.capacity = from.capacity;
+    to.movable_count = from.movable_count;
+    to.has_blocks = from.has_blocks;
     to.filters_in_use = from.filters_in_use;
     if (sets_pairs) bodies_.update_pairs(transfer_, from, &to);
     const Contacts& last = last_contacts();
@@ -417,7 +421,15 @@ class DeviceStep final : public DeviceWorld {
     device_->run(MatchProgram{d}, contacts);
     mark(2);
     device_->run(PrepareProgram{d}, contacts);
-    if (d.world_joints.count > 0) {
+    const bool has_joints = d.world_joints.count > 0;
+    if (d.step.bodies.has_blocks) {
+      if (has_joints) {
+        device_->run(BlockSolveProgram<soft_step::kRowKinds>{d}, contacts);
+      } else {  // one of them returns at once
+        device_->run(BlockSolveProgram<kSphereRowKinds>{d}, contacts);
+        device_->run(BlockSolveProgram<soft_step::kContactRowKinds>{d}, contacts);
+      }
+    } else if (has_joints) {
       device_->run(SolveProgram<soft_step::kRowKinds>{d}, contacts);
     } else {
       device_->run(SolveProgram<soft_step::kContactRowKinds>{d}, contacts);

@@ -24,17 +24,19 @@ struct MatchProgram {
     const StepData& d = data;
     const std::uint32_t spheres = d.counters->spheres;
     team.for_each(spheres + d.counters->manifolds, [&](std::uint32_t i) {
-      const bool is_colored = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
+      const std::uint8_t before = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
       const soft_step::ContactView now = d.contacts();
       const soft_step::ContactKey& key = now.key(i);
       d.constrained[key.a] = d.constrained[key.b] = soft_step::kHasContact;
-      if (is_colored) return;
       const BodyView& bodies = d.step.bodies;
-      if (bodies.movable(key.a) && bodies.movable(key.b)) {
+      if (!bodies.movable(key.a) || !bodies.movable(key.b)) {
+        now.colors[i] = soft_step::kFixedColor;
+      } else if (soft_step::keeps_color(before, is_inner(key))) {
+        now.colors[i] = before;
+        keep(key, before);
+      } else {
         now.colors[i] = soft_step::kNoColor;
         d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = i;
-      } else {
-        now.colors[i] = soft_step::kFixedColor;
       }
     });
     if (d.world_joints.count > 0) {
@@ -76,8 +78,8 @@ struct MatchProgram {
     return last.colors[i] == soft_step::kNoColor;
   }
 
-  /// @returns whether the contact keeps a color
-  JFPX_HD bool match_sphere(std::uint32_t i) const {
+  /// @returns the color of the last step, or kNoColor
+  JFPX_HD std::uint8_t match_sphere(std::uint32_t i) const {
     const StepData& d = data;
     const soft_step::ContactView now = d.contacts(), last = d.last_contacts();
     const soft_step::ContactKey& key = now.spheres[i].key;
@@ -89,14 +91,15 @@ struct MatchProgram {
     if (before == kNone || is_of_removed_body(last, before)) {
       now.impulses[i] = {};
       now.rolling_impulses[i] = {};
-      return false;
+      return soft_step::kNoColor;
     }
     now.impulses[i] = soft_step::at_start_of_step(last.impulses[before]);
-    return keep(now, i, last, before);
+    now.rolling_impulses[i] = last.rolling_impulses[before];
+    return last.colors[before];
   }
 
-  /// @returns whether the contact keeps a color
-  JFPX_HD bool match_manifold(std::uint32_t m) const {
+  /// @returns the color of the last step, or kNoColor
+  JFPX_HD std::uint8_t match_manifold(std::uint32_t m) const {
     const soft_step::ContactView now = data.contacts(), last = data.last_contacts();
     const soft_step::ManifoldInput& contact = now.manifolds[m];
     const std::uint32_t i = now.sphere_count + m;
@@ -107,23 +110,26 @@ struct MatchProgram {
         find(last.manifolds, data.last().manifolds_of[contact.key.a], contact.key);
     if (before == kNone || is_of_removed_body(last, last.sphere_count + before)) {
       now.rolling_impulses[i] = {};
-      return false;
+      return soft_step::kNoColor;
     }
     soft_step::match_points(now, m, last, before);
-    return keep(now, i, last, last.sphere_count + before);
+    now.rolling_impulses[i] = last.rolling_impulses[last.sphere_count + before];
+    return last.colors[last.sphere_count + before];
   }
 
-  /// Keeps the rolling impulse and the color, if any. @returns whether there is a color
-  JFPX_HD bool keep(const soft_step::ContactView& now, std::uint32_t i,
-                    const soft_step::ContactView& last, std::uint32_t before) const {
-    now.rolling_impulses[i] = last.rolling_impulses[before];
-    const std::uint8_t color = last.colors[before];
-    if (color >= soft_step::kColors) return false;
-    now.colors[i] = color;
-    const std::uint64_t bit = std::uint64_t{1} << color;
-    atomic_or(&data.used_colors[now.key(i).a], bit);
-    atomic_or(&data.used_colors[now.key(i).b], bit);
-    return true;
+  /// Whether the row of two movable bodies is an inner row.
+  JFPX_HD bool is_inner(const soft_step::ContactKey& key) const {
+    const BodyView& bodies = data.step.bodies;
+    return !bodies.has_blocks ||
+           soft_step::is_inner(true, bodies.place[key.a], bodies.place[key.b]);
+  }
+
+  /// Adds a color below kColors to the colors of two bodies.
+  JFPX_HD void keep(const soft_step::ContactKey& key, std::uint32_t color) const {
+    const bool is_inner = soft_step::is_inner_color(color);
+    const std::uint64_t bit = std::uint64_t{1} << soft_step::number_in_class(color);
+    atomic_or(&data.used_colors[key.a].of_class(is_inner), bit);
+    atomic_or(&data.used_colors[key.b].of_class(is_inner), bit);
   }
 
   /// Device version of ContactCache::match_joints() and SoftStep::mark_constrained().
@@ -132,18 +138,17 @@ struct MatchProgram {
     const soft_step::JointView joints = d.joints();
     soft_step::KeptJoint now = joints.last[joint];
     if (joints.is_used(joint)) {
-      const auto [a, b, part_a, part_b] = joints.key(joint);
-      const bool is_of_world = b == soft_step::kWorld;
-      d.constrained[a] = soft_step::kHasJoint;
-      if (!is_of_world) d.constrained[b] = soft_step::kHasJoint;
-      if (now.color < soft_step::kColors) {
-        const std::uint64_t bit = std::uint64_t{1} << now.color;
-        atomic_or(&d.used_colors[a], bit);
-        atomic_or(&d.used_colors[b], bit);
-      } else if (!is_of_world && d.step.bodies.movable(a) && d.step.bodies.movable(b)) {
-        d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = d.contacts().size() + joint;
-      } else {
+      const soft_step::ContactKey key = joints.key(joint);
+      const BodyView& bodies = d.step.bodies;
+      const bool is_of_world = key.b == soft_step::kWorld;
+      d.constrained[key.a] = soft_step::kHasJoint;
+      if (!is_of_world) d.constrained[key.b] = soft_step::kHasJoint;
+      if (is_of_world || !bodies.movable(key.a) || !bodies.movable(key.b)) {
         now.color = soft_step::kFixedColor;
+      } else if (soft_step::keeps_color(now.color, is_inner(key))) {
+        keep(key, now.color);
+      } else {
+        d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = d.contacts().size() + joint;
       }
     }
     joints.now[joint] = now;
@@ -181,12 +186,8 @@ struct MatchProgram {
           next_list[atomic_add(next_count, 1)] = i;
           return;
         }
-        std::uint64_t &a = d.used_colors[key.a], &b = d.used_colors[key.b];
-        const std::uint8_t color = soft_step::lowest_free_color(a | b);
-        setup.set_color(i, color);
-        if (color == soft_step::kOverflowColor) return;
-        a |= std::uint64_t{1} << color;
-        b |= std::uint64_t{1} << color;
+        setup.set_color(i, soft_step::take_lowest_color(is_inner(key), &d.used_colors[key.a],
+                                                        &d.used_colors[key.b]));
       });
       team.for_each(left, [&](std::uint32_t k) {
         const soft_step::ContactKey key = setup.key(list[k]);

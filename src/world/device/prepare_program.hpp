@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/base/atomic.hpp"
+#include "src/world/device/inner_bodies.hpp"
 #include "src/world/device/list.hpp"
 #include "src/world/device/step_data.hpp"
 
@@ -11,7 +12,16 @@ namespace device {
 
 /// Wakes islands that touch an awake body, initializes the bodies, and assigns rows to contacts.
 struct PrepareProgram {
+  /// The inner rows of a block, in memory that its threads share.
+  struct BlockRows {
+    /// By kind and color: number of rows, then the next row.
+    std::uint32_t next[soft_step::kRowKinds][soft_step::kColorsPerClass];
+    std::uint32_t points;  ///< of manifolds: their number, then the next one
+    bool has_room[soft_step::kRowKinds];
+  };
+
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kPrepare;
+  static constexpr std::size_t kSharedBytes = sizeof(BlockRows);
   StepData data;
 
   template <class Team>
@@ -22,7 +32,9 @@ struct PrepareProgram {
     if (d.counters->any_asleep != 0) d.islands().wake_touched(team);
     team.for_each(bodies.count, [&](std::uint32_t i) { start(bodies.ids[i].index); });
     place_rows(team);
-    if (size<soft_step::ManifoldRow>() > 0 && !place_points(team)) return;
+    place_points(team);
+    if (bodies.has_blocks) place_inner_rows(team);
+    if (!has_room(team)) return;
     sort_overflow(team);
     team.for_each_nowait(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
     team.for_each_nowait(row_count(), [&](std::uint32_t r) { fill_row(r); });
@@ -34,7 +46,8 @@ struct PrepareProgram {
     const StepData& d = data;
     d.step.load(i);
     soft_step::SolverBody body = d.step.solver[i];
-    d.row_bodies[i] = {body.inverse_mass, body.inverse_inertia, 0};
+    const bool is_active = d.step.bodies.is_active(i);
+    d.row_bodies[i] = {is_active ? body.inverse_mass : Real(0), body.inverse_inertia, 0};
     d.first_fixed[i] = kNone;
     soft_step::FreeMotion free;
     d.step.accelerate(i, &body, &free, true);
@@ -42,7 +55,7 @@ struct PrepareProgram {
     if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], 0);
   }
 
-  /// Assigns a row to each contact and joint, sorted by bin.
+  /// Assigns a row to each contact and joint, sorted by bin, except those with inner rows.
   template <class Team>
   JFPX_HD void place_rows(const Team& team) const {
     const StepData& d = data;
@@ -50,9 +63,15 @@ struct PrepareProgram {
     team.partition(
         setup.size(), d.row_bins, d.counters->bin_begin,
         [&](std::uint32_t i) -> std::uint16_t {
+          const std::uint32_t color = setup.color_of(i);
+          if (d.step.bodies.has_blocks && soft_step::is_inner_color(color)) {
+            if (setup.is_joint(i)) add_inner_joint(setup, i);
+            return soft_step::kNoBin;
+          }
           const soft_step::RowKind kind = setup.kind_of(i);
-          return kind == soft_step::kNoRow ? soft_step::kNoBin
-                                           : soft_step::bin_of(kind, setup.group_of(i));
+          return kind == soft_step::kNoRow
+                     ? soft_step::kNoBin
+                     : soft_step::bin_of(kind, soft_step::RowSetup::group_of(color));
         },
         [&](std::uint32_t i, std::uint32_t row, std::uint16_t bin) {
           d.row_contact[row] = i;
@@ -68,22 +87,180 @@ struct PrepareProgram {
         });
   }
 
-  /// @returns whether the rows of manifolds and their points fit into memory
+  /// Assigns points to the rows of manifolds, except inner rows.
   template <class Team>
-  JFPX_HD bool place_points(const Team& team) const {
+  JFPX_HD void place_points(const Team& team) const {
     const StepData& d = data;
+    const std::uint32_t rows = size<soft_step::ManifoldRow>();
+    if (rows == 0) return;
     const soft_step::ContactView contacts = d.contacts();
     const std::uint32_t first_row = first<soft_step::ManifoldRow>();
-    const std::uint32_t rows = size<soft_step::ManifoldRow>();
-    const bool has_rows = rows <= d.capacity.manifold_rows;
     const auto size = [&](std::uint32_t r) {
       return contacts.impulse_count(d.row_contact[first_row + r]);
     };
     const std::uint32_t points =
         team.scan(rows, size, size, [&](std::uint32_t r, std::uint32_t first) {
-          if (has_rows) d.manifold_rows[r].first = first;
+          if (r < d.capacity.manifold_rows) d.manifold_rows[r].first = first;
         });
-    if (has_rows && points <= d.capacity.row_points) return true;
+    team.once([&] { d.counters->points_of_rows = points; });
+    team.sync();
+  }
+
+  JFPX_HD void add_inner_joint(const soft_step::RowSetup& setup, std::uint32_t i) const {
+    const StepData& d = data;
+    if (setup.kind_of(i) == soft_step::kNoRow) return;
+    const std::uint32_t block = soft_step::block_of(d.step.bodies.place[setup.key(i).a]);
+    prepend(&d.first_inner_joint[block], d.next_inner_joint, setup.joint_of(i));
+  }
+
+  /// Assigns the inner rows of each block, sorted by kind and color, and builds them. They are at
+  /// the end of the arrays of rows.
+  template <class Team>
+  JFPX_HD void place_inner_rows(const Team& team) const {
+    const soft_step::RowSetup setup = data.row_setup();
+    team.for_blocks(data.placed_blocks(), [&](std::uint32_t block, const auto& threads) {
+      auto* rows = static_cast<BlockRows*>(threads.shared(kSharedBytes));
+      constexpr std::uint32_t kCells = soft_step::kRowKinds * soft_step::kColorsPerClass;
+      threads.for_each(kCells, [&](std::uint32_t i) { rows->next[0][i] = 0; });
+      threads.once([&] { rows->points = 0; });
+      threads.sync();
+      for_inner_contacts(threads, setup, block,
+                         [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
+                           atomic_add(&rows->next[kind][color], 1);
+                           if (kind == kManifold) {
+                             atomic_add(&rows->points, setup.contacts.impulse_count(i));
+                           }
+                         });
+      threads.sync();
+      threads.once([&] { allocate_inner_rows(block, rows); });
+      threads.sync();
+      for_inner_contacts(threads, setup, block,
+                         [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
+                           if (!rows->has_room[kind]) return;
+                           const std::uint32_t row = atomic_add(&rows->next[kind][color], 1);
+                           contact_of_inner_row(kind, row) = i;
+                         });
+      threads.sync();
+      fill_inner_rows(threads, setup, block, rows, soft_step::RowTypes());
+    });
+  }
+
+  static constexpr soft_step::RowKind kManifold = soft_step::kKindOf<soft_step::ManifoldRow>;
+
+  JFPX_HD void allocate_inner_rows(std::uint32_t block, BlockRows* rows) const {
+    const StepData& d = data;
+    const std::uint32_t points_end =
+        rows->points + atomic_add(&d.counters->inner_points, rows->points);
+    const std::uint32_t capacity[soft_step::kRowKinds] = {
+        d.sphere_row_capacity, d.capacity.manifold_rows, d.world_joints.count};
+    for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
+      std::uint32_t* const next = rows->next[kind];
+      std::uint32_t count = 0;
+      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+        count += next[color];
+      }
+      const std::uint32_t end =
+          count + (count > 0 ? atomic_add(&d.counters->inner_rows[kind], count) : 0);
+      rows->has_room[kind] =
+          end <= capacity[kind] && (kind != kManifold || points_end <= d.capacity.row_points);
+      std::uint32_t begin = capacity[kind] - end;
+      std::uint32_t* const begins = d.inner_begin(block, kind);
+      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+        begins[color] = begin;
+        const std::uint32_t size = next[color];
+        next[color] = begin;
+        begin += size;
+      }
+      begins[soft_step::kColorsPerClass] = begin;
+    }
+    rows->points = d.capacity.row_points - points_end;
+  }
+
+  /// Calls f(contact, kind, color) for the contacts and joints with inner rows in a block.
+  template <class Threads, class F>
+  JFPX_HD void for_inner_contacts(const Threads& threads, const soft_step::RowSetup& setup,
+                                  std::uint32_t block, const F& f) const {
+    const StepData& d = data;
+    const Range places = d.places_of(block);
+    const auto visit = [&](std::uint32_t i) {
+      const std::uint32_t color = setup.color_of(i);
+      if (!soft_step::is_inner_color(color)) return;
+      const soft_step::RowKind kind = setup.kind_of(i);
+      if (kind != soft_step::kNoRow) f(i, kind, color);
+    };
+    threads.for_each(places.end - places.begin, [&](std::uint32_t k) {
+      const std::uint32_t body = d.body_at[places.begin + k];
+      if (body == kNone) return;
+      const Range spheres = d.now().spheres_of[body], manifolds = d.now().manifolds_of[body];
+      for (std::uint32_t i = spheres.begin; i < spheres.end; ++i) visit(i);
+      for (std::uint32_t i = manifolds.begin; i < manifolds.end; ++i) {
+        visit(setup.contacts.sphere_count + i);
+      }
+    });
+    if (d.world_joints.count == 0) return;
+    threads.once([&] {
+      for (std::uint32_t joint = d.first_inner_joint[block]; joint != kNone;
+           joint = d.next_inner_joint[joint]) {
+        visit(setup.contacts.size() + joint);
+      }
+    });
+  }
+
+  /// The contact or joint of an inner row.
+  JFPX_HD std::uint32_t& contact_of_inner_row(soft_step::RowKind kind, std::uint32_t row) const {
+    return data.inner_contacts[kind][row];
+  }
+
+  template <class Threads, class... Row>
+  JFPX_HD void fill_inner_rows(const Threads& threads, const soft_step::RowSetup& setup,
+                               std::uint32_t block, BlockRows* rows,
+                               const std::tuple<Row...>&) const {
+    const auto fill = [&](auto type) {
+      using RowType = typename decltype(type)::type;
+      constexpr soft_step::RowKind kKind = soft_step::kKindOf<RowType>;
+      if (!rows->has_room[kKind]) return;
+      const std::uint32_t* begin = data.inner_begin(block, kKind);
+      const std::uint32_t first = begin[0], end = begin[soft_step::kColorsPerClass];
+      threads.for_each(end - first, [&](std::uint32_t i) {
+        fill_inner<RowType>(setup, rows, first + i, contact_of_inner_row(kKind, first + i));
+      });
+    };
+    (fill(std::type_identity<Row>()), ...);
+  }
+
+  template <class Row>
+  JFPX_HD void fill_inner(const soft_step::RowSetup& setup, BlockRows* rows, std::uint32_t r,
+                          std::uint32_t contact) const {
+    const StepData& d = data;
+    const std::uint32_t* place = d.step.bodies.place;
+    const auto fill_in = [&](Row* row) {
+      if constexpr (soft_step::kHasParts<Row>) {
+        row->first = atomic_add(&rows->points, setup.contacts.impulse_count(contact));
+      }
+      typename Row::Part* parts = d.parts_of(*row);
+      setup.template fill<false>(row, parts, contact);
+      if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
+        if (any_rebounds(*row, parts)) d.counters->any_rebound = 1;
+      }
+      InnerBodies{place[row->a] % kBodiesPerBlock, place[row->b] % kBodiesPerBlock, contact}
+          .put_into(row);
+    };
+    if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+      Row row;
+      fill_in(&row);
+      d.sphere_rows.store(r, row);
+    } else {
+      fill_in(&d.rows<Row>()[r]);
+    }
+  }
+
+  /// @returns whether the rows of manifolds and their points fit into memory
+  template <class Team>
+  JFPX_HD bool has_room(const Team& team) const {
+    const StepData& d = data;
+    const std::uint32_t rows = size<soft_step::ManifoldRow>() + d.counters->inner_rows[kManifold];
+    const std::uint32_t points = d.counters->points_of_rows + d.counters->inner_points;
+    if (rows <= d.capacity.manifold_rows && points <= d.capacity.row_points) return true;
     team.once([&] {
       d.counters->needed.manifold_rows = rows;
       d.counters->needed.row_points = points;

@@ -1,6 +1,7 @@
 /// Temporary device memory of one step.
 #pragma once
 
+#include "src/world/bodies/body_store.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 
@@ -22,6 +23,8 @@ class ScratchBuffers {
     d.manifold_sizes = transfer.room(&manifold_sizes_, n);
     d.first_fixed = transfer.room(&first_fixed_, n);
     d.used_colors = transfer.room(&used_colors_, n);
+    may_have_blocks_ = n > BodyStore::most_in_one_block;
+    if (may_have_blocks_) reserve_blocks(transfer, n, data);
     d.first_order = transfer.room(&first_order_, n);
     d.first_contact = transfer.room(&first_contact_, n);
     d.parent = transfer.room(&parent_, n);
@@ -32,6 +35,7 @@ class ScratchBuffers {
     d.step.traits = transfer.room(&traits_, n);
     d.step.orientation = transfer.room(&orientation_, n);
     d.motion_cells = transfer.room(&motion_cells_, n);
+    d.codes = codes_in(d.motion_cells, n);
     d.free_cells = transfer.room(&free_cells_, n);
     d.row_bodies = transfer.room(&row_bodies_, n);
     d.pair_count = transfer.room(&pair_count_, 1);
@@ -60,13 +64,44 @@ class ScratchBuffers {
     d.row_bins = transfer.room(&row_bins_, rows);
     d.row_contact = transfer.room(&row_contact_, rows);
     d.next_fixed = transfer.room(&next_fixed_, rows);
+    d.next_inner_joint = transfer.room(&next_inner_joint_, d.world_joints.count);
     d.overflow = transfer.room(&overflow_, rows);
     d.sphere_rows = {transfer.room(&sphere_rows_, contacts), contacts};
+    d.sphere_row_capacity = static_cast<std::uint32_t>(contacts);
+    if (may_have_blocks_) {
+      const std::size_t capacities[] = {contacts, c.manifold_rows, d.world_joints.count};
+      std::uint32_t* next = transfer.room(&inner_contacts_, rows + c.manifold_rows);
+      for (std::size_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
+        d.inner_contacts[kind] = next;
+        next += capacities[kind];
+      }
+    }
     d.manifold_rows = transfer.room(&manifold_rows_, c.manifold_rows);
     d.point_rows = transfer.room(&point_rows_, c.row_points);
   }
 
  private:
+  /// Reserves the arrays of worlds with several blocks. @param n number of slots
+  void reserve_blocks(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
+    StepData& d = *data;
+    // The places of all slots, and as many bodies without a place, from the next block on.
+    d.body_at = transfer.room(&body_at_, 2 * n + kBodiesPerBlock);
+    const std::size_t blocks = 2 * (n / kBodiesPerBlock + 1);
+    constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
+    d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds);
+    d.first_inner_joint = transfer.room(&first_inner_joint_, blocks);
+  }
+
+  static SortedCodes codes_in(MotionCells* memory, std::size_t n) {
+    SortedCodes codes;
+    static_assert(sizeof(MotionCells) >= 2 * (sizeof(*codes.keys) + sizeof(*codes.items)));
+    codes.keys = reinterpret_cast<std::uint64_t*>(memory);
+    codes.other_keys = codes.keys + n;
+    codes.items = reinterpret_cast<std::uint32_t*>(codes.other_keys + n);
+    codes.other_items = codes.items + n;
+    return codes;
+  }
+
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
 
@@ -79,8 +114,10 @@ class ScratchBuffers {
   Buffer<Candidate> candidates_;
   Buffer<CandidateManifold> tested_;
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
-      still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_;
-  Buffer<std::uint64_t> manifold_sizes_, used_colors_, first_order_;
+      still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_, body_at_,
+      inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_;
+  Buffer<soft_step::UsedColors> used_colors_;
+  Buffer<std::uint64_t> manifold_sizes_, first_order_;
   Buffer<std::uint8_t> pair_found_, marked_, constrained_, traits_;
   Buffer<std::uint16_t> row_bins_;
   Buffer<soft_step::SolverBody> solver_;
@@ -92,6 +129,7 @@ class ScratchBuffers {
   Buffer<FreeCells> free_cells_;
   Buffer<RowBody> row_bodies_;
   Buffer<Counters> counters_;
+  bool may_have_blocks_ = false;  ///< whether the world may get several blocks
 };
 
 }  // namespace device

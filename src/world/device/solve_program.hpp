@@ -1,18 +1,16 @@
 /// Substeps and restitution of a soft step on a device.
 #pragma once
 
-#include "src/base/atomic.hpp"
-#include "src/contact_solver/soft_step/row_operations.hpp"
-#include "src/world/device/step_data.hpp"
-#include "src/world/device/sweep.hpp"
+#include "src/world/device/row_solver.hpp"
 
-#include <cstddef>
+#include <cstdint>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Sweeps over all rows, as soft_step::SoftStepSolver, without barriers: a row waits only for the
+/// Sweeps over all rows of a world that is not divided into blocks, as soft_step::SoftStepSolver,
+/// without barriers: a row waits only for the
 /// earlier rows of its two bodies (see Tickets), so that consecutive colors and sweeps overlap.
 /// After the rows of a sweep, each body solves its rows with fixed bodies and completes its part of
 /// the substep. Threads exchange only the motion of bodies: Team::run_dataflow() assigns a row to
@@ -24,12 +22,12 @@ namespace device {
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program without
 ///   rows of joints needs fewer registers
 template <soft_step::RowKind kKinds>
-struct SolveProgram {
+struct SolveProgram : RowSolver<kKinds> {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
   /// Minimum number of items per thread for a second block per multiprocessor. Waiting threads poll
   /// memory, so a second block pays only if rows rarely wait.
   static constexpr std::size_t kItemsPerThread = 32;
-  StepData data;
+  using RowSolver<kKinds>::data;
 
   /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has a bias
   /// sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The last sweep is the
@@ -63,88 +61,12 @@ struct SolveProgram {
   }
 
  private:
-  using SolverBody = soft_step::SolverBody;
-
-  /// Change of the free motion of both bodies by the impact of a row; see soft_step::ImpactBodies.
-  struct Impact {
-    const Vec3* acceleration = nullptr;
-    std::uint32_t a = 0;  ///< body a of the row
-    mutable bool is_pending = false;
-    mutable soft_step::FreeMotion of_a = {}, of_b = {};
-
-    JFPX_HD void add(std::uint32_t body, const Vec3& change, const Vec3& spun) const {
-      is_pending = true;
-      (body == a ? of_a : of_b) = {change, spun};
-    }
-  };
-
-  /// The free motion of a body after the rows of a sweep.
-  struct BodyFree {
-    bool is_read = false, is_changed = false;
-    soft_step::FreeMotion motion;
-
-    JFPX_HD void read(const BodyCells& cells, const BodyCells::Version& version) {
-      if (!is_read) motion = cells.read_free(version);
-      is_read = true;
-    }
-  };
-
-  /// A body of an item: the ticket for which the item waits, and the motion of the body at that
-  /// ticket.
-  struct ItemBody {
-    std::uint32_t index = 0;
-    std::uint32_t before = 0, after = 0;  ///< tickets
-    bool is_ready = false;
-    SolverBody motion;
-    BodyCells::Version version;
-
-    template <bool kRotation>
-    JFPX_HD void read(const StepData& step) {
-      is_ready = step.cells(index).template read<kRotation>(before, &motion, &version);
-    }
-    JFPX_HD void start(std::uint32_t body, const RowBody& constants) {
-      index = body;
-      motion.inverse_mass = constants.inverse_mass;
-      motion.inverse_inertia = constants.inverse_inertia;
-    }
-  };
-
-  /// A row that has a color, or that is solved before the colors.
-  struct RowItem {
-    std::uint32_t row = kNone;
-    soft_step::RowKind kind = 0;
-    ItemBody a, b;
-    soft_step::SphereRow sphere;  ///< the row, if it is of this kind
-  };
+  using Base = RowSolver<kKinds>;
+  using typename Base::BodyFree, typename Base::ItemBody, typename Base::SolverBody;
 
   struct BodyItem : ItemBody {
     bool is_active = false;             ///< whether the body is movable and awake
     std::uint32_t first_fixed = kNone;  ///< of its rows with fixed bodies
-  };
-
-  // Items are constructed in place, bodies a and b are handled without a loop, and run() is
-  // inlined. Otherwise nvcc spills items (6.6 kB per thread in double) or the sweep to memory.
-
-  /// The rows of a sweep, for Team::run_dataflow().
-  template <class Operation>
-  class RowDataflow {
-   public:
-    using Item = RowItem;
-    JFPX_HD RowDataflow(const SolveProgram& program, const Sweep& sweep, const Operation& operation)
-        : program_(program), sweep_(sweep), operation_(operation), cursor_(sweep) {}
-
-    JFPX_HD void begin(std::uint32_t i, RowItem* item) const {
-      const std::uint32_t row = cursor_.find(i);
-      if (row != kNone) program_.begin_colored_row(sweep_, row, cursor_.color(), item);
-    }
-    JFPX_HD bool is_ready(RowItem* item) const { return program_.is_ready(item); }
-    JFPX_HD void complete(RowItem* item) const { program_.solve_row(sweep_, operation_, item); }
-
-   private:
-    const SolveProgram& program_;
-    const Sweep& sweep_;
-    const Operation& operation_;
-    mutable RowCursor cursor_;
   };
 
   /// The bodies after the rows of a sweep, for Team::run_dataflow().
@@ -178,148 +100,12 @@ struct SolveProgram {
                                           const Operation& operation) const {
     if (sweep.overflow() > 0) {
       team.sync();
-      team.once([&] { run_overflow(sweep, operation); });
+      team.once([&] { this->run_overflow(sweep, operation, Tickets(sweep.number, 0).first); });
       team.sync();
     }
-    team.run_dataflow(sweep.colored_items, RowDataflow<Operation>(*this, sweep, operation));
+    team.run_dataflow(sweep.colored_items,
+                      typename Base::template RowDataflow<Operation>(*this, sweep, operation));
     team.run_dataflow(data.step.bodies.count, BodyDataflow<Operation>(*this, sweep, operation));
-  }
-
-  /// Solves the overflow rows one after the other: by kind, then in the order of their contacts.
-  template <class Operation>
-  JFPX_HD void run_overflow(const Sweep& sweep, const Operation& operation) const {
-    const std::uint32_t rows = sweep.overflow();
-    for (std::uint32_t k = 0; k < rows; ++k) {
-      RowItem item;
-      begin_row(sweep, data.overflow[k], &item);
-      item.a.before = item.a.after = Tickets(sweep.number, 0).first;
-      item.b.before = item.b.after = item.a.after;
-      is_ready(&item);
-      solve_row(sweep, operation, &item);
-    }
-  }
-
-  template <class F>
-  JFPX_HD static decltype(auto) visit_row(soft_step::RowKind kind, const F& f) {
-    return soft_step::visit_row<0, kKinds>(kind, f);
-  }
-
-  /// Initializes a row without its tickets.
-  JFPX_HD void begin_row(const Sweep& sweep, std::uint32_t r, RowItem* item) const {
-    const StepData& d = data;
-    item->row = r;
-    item->kind = sweep.kind_of(r);
-    std::uint32_t a = 0, b = 0;
-    visit_row(item->kind, [&](auto type) {
-      using Row = typename decltype(type)::type;
-      if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
-        item->sphere = d.sphere_rows.load(r);
-        a = item->sphere.a, b = item->sphere.b;
-      } else {
-        const Row& row = d.rows<Row>()[r - sweep.first<Row>()];
-        a = row.a, b = row.b;
-      }
-    });
-    item->a.start(a, d.row_bodies[a]);
-    item->b.start(b, d.row_bodies[b]);
-  }
-
-  JFPX_HD void begin_colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color,
-                                 RowItem* item) const {
-    begin_row(sweep, r, item);
-    const auto set_tickets = [&](ItemBody* body) {
-      const Tickets tickets(sweep.number, data.row_bodies[body->index].colors);
-      body->before = tickets.before(color);
-      body->after = tickets.after(color);
-    };
-    set_tickets(&item->a);
-    set_tickets(&item->b);
-  }
-
-  JFPX_HD bool is_ready(RowItem* item) const {
-    if (item->row == kNone) return true;
-    const auto read = [&](ItemBody* body) {
-      if (body->is_ready) return;
-      visit_row(item->kind, [&](auto type) {
-        body->template read<decltype(type)::type::kReadsRotation>(data);
-      });
-    };
-    read(&item->a);
-    read(&item->b);
-    return item->a.is_ready && item->b.is_ready;
-  }
-
-  template <class Operation>
-  JFPX_HD void solve_row(const Sweep& sweep, const Operation& operation, RowItem* item) const {
-    if (item->row == kNone) return;
-    visit_row(item->kind, [&](auto type) {
-      using Row = typename decltype(type)::type;
-      if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
-        solve_spheres(sweep, operation, item);
-      } else {
-        solve_other<Row>(sweep, operation, item);
-      }
-    });
-  }
-
-  template <class Operation>
-  JFPX_HD void solve_spheres(const Sweep& sweep, const Operation& operation, RowItem* item) const {
-    soft_step::SphereRow& row = item->sphere;
-    const Real restitution = row.restitution;
-    const Vec3 shift_a = item->a.motion.shift, shift_b = item->b.motion.shift;
-    const Impact impact{data.step.bodies.last_acceleration, row.a};
-    const soft_step::BodyPair pair{&item->a.motion, &item->b.motion, nullptr, nullptr};
-    operation.template run<false>(
-        &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
-    const auto write = [&](ItemBody* body, const Vec3& shift, const soft_step::FreeMotion& change) {
-      const BodyCells cells = data.cells(body->index);
-      if constexpr (Operation::kMovesBodies) {
-        if (!(body->motion.shift == shift)) cells.write_shift(body->motion, &body->version);
-        if (impact.is_pending) {
-          soft_step::FreeMotion free = cells.read_free(body->version);
-          free.add(change.velocity, change.angular_velocity);
-          cells.write_free(free, &body->version);
-        }
-      }
-      cells.write(body->after, body->motion, body->version);
-    };
-    write(&item->a, shift_a, impact.of_a);
-    write(&item->b, shift_b, impact.of_b);
-    store<Operation>(sweep, row, restitution, item->row);
-  }
-
-  template <class Row, class Operation>
-  JFPX_HD void solve_other(const Sweep& sweep, const Operation& operation, RowItem* item) const {
-    Row row = data.rows<Row>()[item->row - sweep.first<Row>()];
-    const Mat3* inertia = data.step.bodies.inverse_inertia;
-    const Mat3 inertia_a = inertia[item->a.index], inertia_b = inertia[item->b.index];
-    auto context = context_of(
-        row, soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
-    Quat orientation_a, orientation_b;
-    if constexpr (Row::kReadsOrientation) {
-      orientation_a = data.orientation_cells[item->a.index].load(sweep.moves());
-      orientation_b = data.orientation_cells[item->b.index].load(sweep.moves());
-      context.orientations = {&orientation_a, &orientation_b};
-    }
-    operation.template run<false>(&row, context);
-    const auto write = [&](ItemBody* body) {
-      const BodyCells cells = data.cells(body->index);
-      if constexpr (Operation::kMovesBodies) {
-        cells.write_shift(body->motion, &body->version);
-        if constexpr (Row::kReadsRotation) cells.write_rotation(body->motion, &body->version);
-      }
-      cells.write(body->after, body->motion, body->version);
-    };
-    write(&item->a);
-    write(&item->b);
-    store<Operation>(sweep, row, item->row);
-  }
-
-  /// For a row that does not rebound in the sweeps.
-  template <class Row>
-  JFPX_HD soft_step::RowContext<typename Row::Part, soft_step::ImpactBodies> context_of(
-      const Row& row, const soft_step::BodyPair& pair) const {
-    return {pair, data.parts_of(row), nullptr};
   }
 
   JFPX_HD void begin_body(const Sweep& sweep, std::uint32_t body, BodyItem* item) const {
@@ -329,8 +115,8 @@ struct SolveProgram {
     item->is_active = constants.inverse_mass > 0 && d.step.bodies.awake[body] != 0;
     item->first_fixed = d.first_fixed[body];
     const Tickets tickets(sweep.number, constants.colors);
-    item->before = tickets.before_body();
-    item->after = tickets.after_body();
+    item->before = tickets.last();
+    item->after = Tickets(sweep.number + 1, 0).first;
   }
 
   template <class Operation>
@@ -338,8 +124,7 @@ struct SolveProgram {
     const StepData& d = data;
     const std::uint32_t i = item->index;
     if (!item->is_active) {
-      const BodyView& bodies = d.step.bodies;
-      if (bodies.is_carrier(i)) complete_kinematic(sweep, i);
+      if (sweep.stage == BodyStage::finish) this->finish_kinematic(i);
       return;
     }
     SolverBody& body = item->motion;
@@ -347,12 +132,12 @@ struct SolveProgram {
     BodyFree free;
     for (std::uint32_t r = item->first_fixed; r != kNone;) {
       const std::uint32_t next = d.next_fixed[r];
-      solve_fixed(sweep, operation, r, item, &free);
+      this->solve_fixed(sweep, operation, r, item, &free);
       r = next;
     }
     if (sweep.stage == BodyStage::finish) {
       d.step.solver[i] = body;
-      check_state(i);
+      this->check_state(i);
       return;
     }
     if (sweep.stage == BodyStage::move) {
@@ -370,122 +155,6 @@ struct SolveProgram {
     cells.write_rotation(body, &item->version);
     if (free.is_changed) cells.write_free(free.motion, &item->version);
     cells.write(item->after, body, item->version);
-  }
-
-  JFPX_HD void complete_kinematic(const Sweep& sweep, std::uint32_t i) const {
-    SolverBody body = fixed_body(i, sweep.moves());
-    if (sweep.stage == BodyStage::move) data.step.move(i, &body);
-    if (sweep.stage == BodyStage::finish) {
-      data.step.solver[i].shift = body.shift;
-      data.step.solver[i].rotation = body.rotation;
-      check_state(i);
-    }
-  }
-
-  /// Cancels the step if a body has left the world.
-  JFPX_HD void check_state(std::uint32_t i) const {
-    if (!is_in_world(data.step.state(i))) atomic_min(&data.counters->runaway, i);
-  }
-
-  /// State of an immovable or kinematic body after a number of moves. Each row that reads a
-  /// kinematic body computes its motion, so no row waits for the body.
-  JFPX_HD SolverBody fixed_body(std::uint32_t i, std::uint32_t moves) const {
-    SolverBody body;
-    body.velocity = data.step.solver[i].velocity;
-    body.angular_velocity = data.step.solver[i].angular_velocity;
-    if (data.step.bodies.awake[i] == 0) return body;
-    for (std::uint32_t k = 0; k < moves; ++k) {
-      body.shift = add_scaled(body.shift, body.velocity, data.step.h);
-      body.rotation = add_scaled(body.rotation, body.angular_velocity, data.step.h);
-    }
-    return body;
-  }
-
-  /// Orientation of an immovable or kinematic body after a number of moves.
-  JFPX_HD Quat fixed_orientation(std::uint32_t i, std::uint32_t moves) const {
-    const StepData& d = data;
-    Quat orientation = d.step.bodies.orientation[i];
-    if (d.step.bodies.awake[i] == 0) return orientation;
-    for (std::uint32_t k = 0; k < moves; ++k) {
-      orientation = d.step.turned(orientation, d.step.solver[i]);
-    }
-    return orientation;
-  }
-
-  /// Solves a row of a movable body with a fixed one.
-  template <class Operation>
-  JFPX_HD void solve_fixed(const Sweep& sweep, const Operation& operation, std::uint32_t r,
-                           BodyItem* item, BodyFree* free) const {
-    visit_row(sweep.kind_of(r), [&](auto type) {
-      using Row = typename decltype(type)::type;
-      if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
-        solve_fixed_spheres(sweep, operation, r, item, free);
-      } else {
-        solve_fixed_other<Row>(sweep, operation, r, item);
-      }
-    });
-  }
-
-  template <class Operation>
-  JFPX_HD void solve_fixed_spheres(const Sweep& sweep, const Operation& operation, std::uint32_t r,
-                                   BodyItem* item, BodyFree* free) const {
-    soft_step::SphereRow row = data.sphere_rows.load(r);
-    const Real restitution = row.restitution;
-    SolverBody fixed;  // not read: the body is constant
-    const Impact impact{data.step.bodies.last_acceleration, row.a};
-    const soft_step::BodyPair pair{&item->motion, &fixed, nullptr, nullptr};
-    operation.template run<true>(
-        &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
-    if (impact.is_pending) {
-      free->read(data.cells(item->index), item->version);
-      free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
-      free->is_changed = true;
-    }
-    store<Operation>(sweep, row, restitution, r);
-  }
-
-  template <class Row, class Operation>
-  JFPX_HD void solve_fixed_other(const Sweep& sweep, const Operation& operation, std::uint32_t r,
-                                 BodyItem* item) const {
-    Row row = data.rows<Row>()[r - sweep.first<Row>()];
-    SolverBody fixed;
-    const Mat3 inertia = data.step.bodies.inverse_inertia[row.a];
-    const Mat3 none;
-    auto context = context_of(row, soft_step::BodyPair{&item->motion, &fixed, &inertia, &none});
-    Quat orientation_a, orientation_b;
-    if constexpr (Row::kReadsOrientation) {
-      orientation_a = data.step.orientation[row.a];
-      context.orientations = {&orientation_a, &orientation_b};
-    }
-    if (!Row::kReadsOrientation || row.b != soft_step::kWorld) {
-      fixed = fixed_body(row.b, sweep.moves());
-      if constexpr (Row::kReadsOrientation) orientation_b = fixed_orientation(row.b, sweep.moves());
-    }
-    operation.template run<true>(&row, context);
-    store<Operation>(sweep, row, r);
-  }
-
-  /// Stores the changes of a row by an operation. @param restitution before the operation
-  template <class Operation>
-  JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real restitution,
-                     std::uint32_t r) const {
-    if constexpr (Operation::kChangesRow) {
-      using Row = soft_step::SphereRow;
-      data.sphere_rows.store_bytes<0, offsetof(Row, normal)>(r, row);
-      if (restitution != row.restitution) {
-        data.sphere_rows.store_bytes<offsetof(Row, restitution), offsetof(Row, a)>(r, row);
-      }
-      if (sweep.stores_impulses) data.row_setup().store(row, nullptr, data.row_contact[r]);
-    }
-  }
-  template <class Operation, class Row>
-  JFPX_HD void store(const Sweep& sweep, const Row& row, std::uint32_t r) const {
-    if constexpr (Operation::kChangesRow) {
-      store_changes(row, &data.rows<Row>()[r - sweep.first<Row>()]);
-      if (sweep.stores_impulses) {
-        data.row_setup().store(row, data.parts_of(row), data.row_contact[r]);
-      }
-    }
   }
 };
 

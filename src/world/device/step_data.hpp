@@ -3,6 +3,7 @@
 
 #include <jfpx/cuda/sphere_collider.hpp>
 
+#include "src/contact_solver/soft_step/blocks.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
 #include "src/world/contacts/candidate_test.hpp"
 #include "src/world/device/body_cells.hpp"
@@ -22,6 +23,7 @@ namespace device {
 inline constexpr std::uint32_t kNone = 0xffffffffu;
 
 using soft_step::kBins;
+using soft_step::kBodiesPerBlock;
 
 /// Capacities of lists whose size is known only on the device. A step that exceeds a capacity does
 /// not change the state of the world; the host reserves Counters::needed and repeats the step.
@@ -81,7 +83,14 @@ struct StepCounters {
   std::uint32_t any_rests = 0;      ///< 1: a body has been slow for long enough to sleep
   std::uint32_t runaway = kNone;    ///< index of the first body for which is_in_world() is false
   std::uint32_t uncolored[3] = {};  ///< number of contacts without a color, by round modulo 3
-  std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows
+  std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows, except inner rows
+  std::uint32_t places = 0;                 ///< end of the places of all movable bodies
+  std::uint32_t without_place = 0;          ///< number of movable bodies without a place
+  std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
+  std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
+  std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
+  std::uint32_t unused = 0;                             ///< instead of padding
+  std::uint64_t largest_coordinate = 0;                 ///< partition::magnitude_of()
 
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
@@ -136,6 +145,12 @@ struct DeviceJoints {
   std::uint32_t count = 0;             ///< number of slots
 };
 
+/// Arrays that are sorted by key, and as much memory for the sort.
+struct SortedCodes {
+  std::uint64_t *keys = nullptr, *other_keys = nullptr;
+  std::uint32_t *items = nullptr, *other_items = nullptr;
+};
+
 /// Everything that the programs of a step use, passed to kernels by value.
 struct StepData {
   soft_step::StepBodies step;
@@ -161,7 +176,11 @@ struct StepData {
   /// By body a: its number of manifolds, and in the lower half that of their points.
   std::uint64_t* manifold_sizes = nullptr;
 
-  std::uint64_t* used_colors = nullptr;  ///< by body
+  /// The movable bodies by place, with kNone in unused places, then from first_without_place() on
+  /// the bodies without a place.
+  std::uint32_t* body_at = nullptr;
+
+  soft_step::UsedColors* used_colors = nullptr;  ///< by body
   /// By body: lowest color_order() of its uncolored contacts, and the lowest of those contacts.
   std::uint64_t* first_order = nullptr;
   std::uint32_t* first_contact = nullptr;
@@ -171,14 +190,21 @@ struct StepData {
   std::uint8_t* marked = nullptr;       ///< by label of an island
   std::uint8_t* constrained = nullptr;  ///< by body: StepBodies::constrained
 
-  std::uint16_t* row_bins = nullptr;     ///< by contact or joint, as RowSetup numbers them
-  std::uint32_t* row_contact = nullptr;  ///< by row of any kind: index of its contact or joint
+  std::uint16_t* row_bins = nullptr;  ///< by contact or joint, as RowSetup numbers them
+  /// By row of any kind, except inner rows: index of its contact or joint.
+  std::uint32_t* row_contact = nullptr;
   StripedArray<soft_step::SphereRow> sphere_rows;
+  std::uint32_t sphere_row_capacity = 0;
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
   soft_step::DistanceRow* distance_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
+  /// Inner rows by block, kind and color, as numbers of inner_row(); see inner_begin().
+  std::uint32_t* inner_rows = nullptr;
+  std::uint32_t* inner_contacts[soft_step::kRowKinds] = {};  ///< by kind and inner row
+  std::uint32_t* first_inner_joint = nullptr;  ///< by block: list of the joints of inner rows
+  std::uint32_t* next_inner_joint = nullptr;   ///< by joint
   /// The overflow rows: by kind, then in the order of contacts.
   std::uint32_t* overflow = nullptr;
   MotionCells* motion_cells = nullptr;            ///< by body
@@ -186,6 +212,8 @@ struct StepData {
   RowBody* row_bodies = nullptr;                  ///< by body
   OrientationCells* orientation_cells = nullptr;  ///< by body, of bodies with joints
   SavedColumns<PointerColumn> saved;              ///< values at the start of the step
+  /// By body. In the memory of motion_cells, which are not in use when the partition is renewed.
+  SortedCodes codes;
 
   /// The rows of a kind other than spheres, by their number in this kind.
   template <class Row>
@@ -207,6 +235,33 @@ struct StepData {
       return nullptr;
     }
   }
+  /// Index in `body_at` of the first body without a place, which starts a block.
+  JFPX_HD std::uint32_t first_without_place() const {
+    return (step.bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock * kBodiesPerBlock;
+  }
+  /// Number of blocks of bodies with places, which precede the blocks of the other bodies.
+  JFPX_HD std::uint32_t placed_blocks() const {
+    return (counters->places + kBodiesPerBlock - 1) / kBodiesPerBlock;
+  }
+  JFPX_HD std::uint32_t block_count() const {
+    return placed_blocks() + (counters->without_place + kBodiesPerBlock - 1) / kBodiesPerBlock;
+  }
+  /// The range of `body_at` of a block.
+  JFPX_HD Range places_of(std::uint32_t block) const {
+    const std::uint32_t placed = placed_blocks();
+    const bool is_placed = block < placed;
+    const std::uint32_t base = is_placed ? 0 : first_without_place();
+    const std::uint32_t end = base + (is_placed ? counters->places : counters->without_place);
+    const std::uint32_t begin = base + (is_placed ? block : block - placed) * kBodiesPerBlock;
+    return {begin, begin + kBodiesPerBlock < end ? begin + kBodiesPerBlock : end};
+  }
+  /// First inner row of a block, kind and color, of kColorsPerClass + 1 colors: the last element is
+  /// the end.
+  JFPX_HD std::uint32_t* inner_begin(std::uint32_t block, soft_step::RowKind kind) const {
+    constexpr std::uint32_t kStride = soft_step::kColorsPerClass + 1u;
+    return inner_rows + (block * soft_step::kRowKinds + kind) * kStride;
+  }
+
   JFPX_HD BodyCells cells(std::uint32_t body) const {
     return {&motion_cells[body], &free_cells[body]};
   }

@@ -14,7 +14,7 @@ namespace device {
 /// Rows per warp; all have the same bin.
 inline constexpr std::uint32_t kWarpItems = 32;
 
-/// Work on a body after the rows of a sweep.
+/// Work on a body between two sweeps.
 enum class BodyStage : std::uint8_t {
   none,
   move,        ///< ends a substep
@@ -22,24 +22,61 @@ enum class BodyStage : std::uint8_t {
   finish       ///< ends the last sweep
 };
 
+/// What a sweep does with the rows.
+enum class SweepKind : std::uint8_t { none, warm_start, bias, relax, restitution };
+
+/// The sweeps of a step, in the order of SoftStep::solve(): the warm start, those of the substeps,
+/// and the restitution of manifolds.
+struct SweepList {
+  std::uint32_t substeps = 0;
+  bool restitutes = false;
+
+  /// Number of sweeps.
+  JFPX_HD std::uint32_t size() const { return end_of_substeps() + (restitutes ? 1 : 0); }
+  JFPX_HD SweepKind kind(std::uint32_t sweep) const {
+    if (sweep >= size()) return SweepKind::none;
+    if (sweep == 0) return SweepKind::warm_start;
+    if (sweep == end_of_substeps()) return SweepKind::restitution;
+    return is_bias(sweep) ? SweepKind::bias : SweepKind::relax;
+  }
+  /// Work on the bodies between the rows of a sweep and those of the sweep before.
+  JFPX_HD BodyStage stage_before(std::uint32_t sweep) const {
+    if (sweep == size()) return BodyStage::finish;
+    if (sweep < 2 || sweep >= end_of_substeps()) return BodyStage::none;
+    if (is_bias(sweep)) return BodyStage::accelerate;
+    return is_bias(sweep - 1) ? BodyStage::move : BodyStage::none;
+  }
+  /// Whether a sweep stores the final impulses of the rows.
+  JFPX_HD bool stores_impulses(std::uint32_t sweep) const { return sweep + 1 == end_of_substeps(); }
+  /// Number of moves of the bodies before the rows of a sweep are solved.
+  JFPX_HD static std::uint32_t moves(std::uint32_t sweep) {
+    return (sweep + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
+  }
+
+ private:
+  JFPX_HD std::uint32_t end_of_substeps() const {
+    return 1 + substeps * soft_step::kSweepsPerSubstep;
+  }
+  JFPX_HD static bool is_bias(std::uint32_t sweep) {
+    return (sweep - 1) % soft_step::kSweepsPerSubstep == 0;
+  }
+};
+
+/// The rows of a sweep, except rows of blocks.
 struct Sweep {
   const std::uint32_t* begin;       ///< Counters::bin_begin
-  std::uint32_t colored_items = 0;  ///< number of items for all rows that have a color
+  std::uint32_t colored_items = 0;  ///< number of items for all rows of colors
   std::uint32_t number = 0;
-  BodyStage stage = BodyStage::none;
-  bool stores_impulses = false;  ///< whether this sweep stores the final impulses of the rows
+  BodyStage stage = BodyStage::none;  ///< after the rows; not used by BlockSolveProgram
+  bool stores_impulses = false;       ///< whether this sweep stores the final impulses of the rows
 
   JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
-      for (std::uint32_t group = soft_step::group_of_color(0); group < soft_step::kFixedGroup;
+      for (std::uint32_t group = soft_step::group_of_crossing(0); group < soft_step::kFixedGroup;
            ++group) {
         colored_items += items(soft_step::bin_of(kind, group));
       }
     }
-  }
-  JFPX_HD void start(BodyStage next) {
-    ++number;
-    stage = next;
   }
   JFPX_HD soft_step::RowKind kind_of(std::uint32_t row) const {
     return soft_step::kind_of_row(begin, row);
@@ -62,13 +99,15 @@ struct Sweep {
     }
     return rows;
   }
-  /// Number of moves of a kinematic body before the rows of the sweep are solved.
-  JFPX_HD std::uint32_t moves() const {
-    return (number + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
+  JFPX_HD void start(BodyStage next) {
+    ++number;
+    stage = next;
   }
+  /// See SweepList.
+  JFPX_HD std::uint32_t moves() const { return SweepList::moves(number); }
 };
 
-/// Iterates over the rows of the colors in sweep order: by color, then by kind.
+/// Iterates over the crossing rows in sweep order: by color, then by kind.
 class RowCursor {
  public:
   JFPX_HD explicit RowCursor(const Sweep& sweep) : sweep_(sweep) {}
@@ -78,7 +117,7 @@ class RowCursor {
   JFPX_HD std::uint32_t find(std::uint32_t item) {
     if (item < before_) {
       before_ = 0;
-      group_ = soft_step::group_of_color(0);
+      group_ = soft_step::group_of_crossing(0);
       kind_ = 0;
     }
     while (item - before_ >= sweep_.items(bin())) {
@@ -92,12 +131,13 @@ class RowCursor {
     return index < sweep_.size(bin()) ? sweep_.begin[bin()] + index : kNone;
   }
 
-  JFPX_HD std::uint32_t color() const { return group_ - soft_step::group_of_color(0); }
+  /// Number of the color in the class.
+  JFPX_HD std::uint32_t color() const { return group_ - soft_step::group_of_crossing(0); }
 
  private:
   JFPX_HD std::uint32_t bin() const { return soft_step::bin_of(kind_, group_); }
   const Sweep& sweep_;
-  std::uint32_t before_ = 0, group_ = soft_step::group_of_color(0);
+  std::uint32_t before_ = 0, group_ = soft_step::group_of_crossing(0);
   std::uint32_t kind_ = 0;
 };
 

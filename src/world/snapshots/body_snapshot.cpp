@@ -2,6 +2,7 @@
 ///
 /// Derived values are recomputed with the same bits. The inertia in world axes is stored, because
 /// that of a sphere is not updated by every rotation.
+#include "src/contact_solver/soft_step/blocks.hpp"
 #include "src/scene/scene_validate.hpp"
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/snapshots/snapshot_checks.hpp"
@@ -55,7 +56,11 @@ void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
     }
   };
   each_given(self.moving, self.properties_, self.host_, self.given_inertia_, kAnyBody, column);
-  each_other_motion(column, self.moving);
+  each_other_motion(
+      [&](auto& values) {
+        if (static_cast<const void*>(&values) != &self.moving.place) archive(values[i]);
+      },
+      self.moving);
 }
 
 void BodyStore::write(BinaryWriter* writer) const {
@@ -72,6 +77,27 @@ void BodyStore::write(BinaryWriter* writer) const {
 void BodyStore::read(BinaryReader* reader) {
   read_bodies(reader, read_slots(reader));
   read_pairs(reader);
+}
+
+bool BodyStore::has_places() const noexcept {
+  return std::ranges::any_of(
+      ids(), [this](BodyId id) { return moving.place[id.index] != soft_step::kNoPlace; });
+}
+
+void BodyStore::write_places(BinaryWriter* writer) const {
+  for (const BodyId id : ids()) (*writer)(moving.place[id.index]);
+}
+
+void BodyStore::read_places(BinaryReader* reader) {
+  std::vector<bool> is_taken(capacity());  // by place
+  for (const BodyId id : ids()) {
+    const auto place = reader->get<std::uint32_t>();
+    moving.place[id.index] = place;
+    if (place == soft_step::kNoPlace) continue;
+    BinaryReader::require(movable(id.index) && place < is_taken.size() && !is_taken[place],
+                          "a body has no valid place in the partition");
+    is_taken[place] = true;
+  }
 }
 
 /// Reads generations and unused slots. @returns by slot: whether it is unused
@@ -92,6 +118,7 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
         i < capacity() && !is_free[i] && (ids().empty() || ids().back().index < i),
         "its list of bodies is invalid");
     serialize_body(*reader, *this, i);
+    moving.place[i] = soft_step::kNoPlace;
     check_body(i);
     pool_.use(i);
     derive_properties(i);

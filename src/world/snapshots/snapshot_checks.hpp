@@ -47,14 +47,17 @@ class SnapshotColors {
     if (color >= soft_step::kColors) return;
     BinaryReader::require(b != soft_step::kWorld && bodies.movable(a) && bodies.movable(b),
                           messages.immovable);
-    const std::uint64_t bit = std::uint64_t{1} << color;
-    BinaryReader::require(((used_[a] | used_[b]) & bit) == 0, messages.same);
-    used_[a] |= bit;
-    used_[b] |= bit;
+    const bool is_inner = soft_step::is_inner_color(color);
+    const std::uint64_t bit = std::uint64_t{1} << soft_step::number_in_class(color);
+    for (const std::uint32_t body : {a, b}) {
+      std::uint64_t& used = used_[body].of_class(is_inner);
+      BinaryReader::require((used & bit) == 0, messages.same);
+      used |= bit;
+    }
   }
 
  private:
-  std::vector<std::uint64_t> used_;  ///< by body: the set of its colors
+  std::vector<soft_step::UsedColors> used_;  ///< by body
 };
 
 }  // namespace JFPX_ABI

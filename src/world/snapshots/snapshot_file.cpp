@@ -2,8 +2,9 @@
 ///
 /// Layout, little-endian: magic (8 bytes), version and size of Real (4 bytes each), length of the
 /// content (8 bytes), the content, and the checksum of all preceding bytes (8 bytes). A change of
-/// the content requires another version. Version 2 has joints after the content of version 1; a
-/// world that never had joints has snapshots of version 1.
+/// the content requires another version. Version 2 has joints after the content of version 1, and
+/// version 3 the places of bodies in the partition into blocks after them. A world that never had
+/// joints and blocks has snapshots of version 1.
 #include "src/world/snapshots/snapshot_file.hpp"
 
 #include "src/base/file.hpp"
@@ -18,7 +19,7 @@ inline namespace JFPX_ABI {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'J', 'F', 'P', 'X', 'S', 'N', 'P', '\n'};
-constexpr std::uint32_t kVersion = 1, kVersionWithJoints = 2;
+constexpr std::uint32_t kVersion = 1, kLatestVersion = 3;
 
 struct Header {
   std::array<char, 8> magic = kMagic;
@@ -51,9 +52,9 @@ void check(std::span<const std::byte> bytes) {
   if (bytes.size() < sizeof header || header.magic != kMagic) {
     throw InvalidSnapshot("this is not a snapshot of jfpx, or it is truncated");
   }
-  if (header.version != kVersion && header.version != kVersionWithJoints) {
+  if (header.version < kVersion || header.version > kLatestVersion) {
     fail("is of version " + std::to_string(header.version) + "; this build reads versions " +
-         std::to_string(kVersion) + " and " + std::to_string(kVersionWithJoints));
+         std::to_string(kVersion) + " to " + std::to_string(kLatestVersion));
   }
   if (header.real_size != sizeof(Real)) {
     fail("is " + precision_name(header.real_size) + "; it must be " + precision_name(sizeof(Real)));
@@ -80,11 +81,11 @@ void start_snapshot(BinaryWriter* writer) {
   }
 }
 
-Snapshot finish_snapshot(BinaryWriter* writer, bool has_joints) {
+Snapshot finish_snapshot(BinaryWriter* writer, SnapshotParts parts) {
   Snapshot snapshot{writer->take()};
   std::vector<std::byte>& bytes = snapshot.bytes;
   Header header;
-  if (has_joints) header.version = kVersionWithJoints;
+  header.version = kVersion + static_cast<std::uint32_t>(parts);
   header.content_size = bytes.size() - sizeof header;
   std::memcpy(bytes.data(), &header, sizeof header);
   const auto sum = std::bit_cast<std::array<std::byte, kChecksumSize>>(checksum(bytes));

@@ -79,6 +79,7 @@ void SoftStep::prepare(const BodyStore& bodies) {
   free_.resize(capacity);
   marked_.resize(capacity);
   parent_.resize(capacity);
+  partition_.reserve(bodies);
 }
 
 soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
@@ -166,7 +167,8 @@ std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
 std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointView& joints) {
   prepare(*bodies);
   joints_ = joints;
-  cache_.match(bodies->inverse_masses(), bodies->any_rolls(), joints, pool_);
+  cache_.match({bodies->inverse_masses(), bodies->moving.place, bodies->has_blocks()},
+               bodies->any_rolls(), joints, pool_);
   mark_constrained();
   step_ = {.bodies = bodies->view(),
            .motion = bodies->motion_pointers(),
@@ -195,25 +197,32 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
                                 .orientation = orientation_.data()},
                  .start = bodies_.data(),
                  .restitution_threshold = constants_.restitution_threshold},
-                bodies_.size(), {step_.bodies.last_acceleration, free_.data()}, constants_);
-  for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
-    for_each_body(*bodies, [&](std::uint32_t i) {
-      step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);
-    });
-    if (substep == 0) solver_.warm_start(bodies_);
-    solver_.solve(bodies_, true);
-    for_each_body(*bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
-    for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.solve(bodies_, false);
-  }
-  solver_.restitute(bodies_);
+                bodies_, bodies->mobile(), bodies->moving.place, bodies->has_blocks(),
+                {step_.bodies.last_acceleration, free_.data()}, constants_);
+  run_substeps(*bodies);
   solver_.store();
   return find_runaway(*bodies);
 }
 
-void SoftStep::commit(BodyStore* bodies) noexcept {
+void SoftStep::run_substeps(const BodyStore& bodies) {
+  using soft_step::Sweep;
+  for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
+    for_each_body(bodies, [&](std::uint32_t i) {
+      step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);
+    });
+    if (substep == 0) solver_.sweep(Sweep::warm_start);
+    solver_.sweep(Sweep::bias);
+    for_each_body(bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
+    for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.sweep(Sweep::relax);
+  }
+  if (solver_.needs_restitution()) solver_.sweep(Sweep::restitution);
+}
+
+void SoftStep::commit(BodyStore* bodies, std::uint64_t steps) noexcept {
   const bool any_rests = any_body(*bodies, [this](std::uint32_t i) { return step_.store(i); });
   if (any_rests) islands_of(*bodies).put_to_sleep(PoolTeam(pool_));
   cache_.commit();
+  partition_.update(bodies, steps, pool_);
 }
 
 }  // namespace JFPX_ABI

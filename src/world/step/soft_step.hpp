@@ -7,6 +7,7 @@
 #include "src/contact_solver/soft_step/contact_cache.hpp"
 #include "src/contact_solver/soft_step/cpu/soft_step_solver.hpp"
 #include "src/world/bodies/body_store.hpp"
+#include "src/world/bodies/partition.hpp"
 #include "src/world/step/islands.hpp"
 #include "src/world/step/soft_step_stages.hpp"
 
@@ -20,7 +21,6 @@ inline namespace JFPX_ABI {
 /// A step: the caller fills contacts() and calls add_generated(), solve() and commit(). If commit()
 /// is not called, poses and velocities are unchanged, and the next step starts with the contacts of
 /// the last completed step.
-/// changed.
 class SoftStep {
  public:
   /// @param pool outlives the object
@@ -43,8 +43,9 @@ class SoftStep {
   /// @returns the first body for which is_in_world() is false, if any
   /// @param joints its arrays are valid until commit(); `now` receives their impulses
   std::optional<BodyId> solve(BodyStore* bodies, const soft_step::JointView& joints);
-  /// Moves the bodies, clears forces, and puts islands to sleep.
-  void commit(BodyStore* bodies) noexcept;
+  /// Moves the bodies, clears forces, puts islands to sleep, and renews the partition into blocks
+  /// if it is due. @param steps World::steps() before the step
+  void commit(BodyStore* bodies, std::uint64_t steps) noexcept;
   /// Reserves memory for bodies with indices below `bodies`. @throws std::bad_alloc
   void reserve(std::size_t bodies) { cache_.reserve(bodies); }
   /// Replaces the parameters of the constructor and the contacts of the last completed step.
@@ -69,6 +70,7 @@ class SoftStep {
   void mark_constrained();
   template <class Stage>
   void for_each_body(const BodyStore& bodies, const Stage& stage);
+  void run_substeps(const BodyStore& bodies);
   template <class Test>
   bool any_body(const BodyStore& bodies, const Test& test);
   void load(const BodyStore& bodies);
@@ -90,6 +92,7 @@ class SoftStep {
   std::vector<std::uint8_t> constrained_;      ///< by body: StepBodies::constrained
   std::vector<std::uint32_t> parent_;          ///< by body: soft_step::DisjointSets::parent
   std::vector<std::uint8_t> marked_;           ///< by label of an island
+  Partition partition_;
 };
 
 }  // namespace JFPX_ABI

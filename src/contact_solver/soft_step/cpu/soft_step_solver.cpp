@@ -3,11 +3,14 @@
 
 #include "src/base/cpu.hpp"
 #include "src/base/parallel_for.hpp"
+#include "src/base/prefetch.hpp"
 #include "src/base/reserve.hpp"
 #include "src/contact_solver/soft_step/row_operations.hpp"
 
 #include <algorithm>
 #include <cstddef>
+#include <mutex>
+#include <numeric>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -17,8 +20,10 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096, kBlocksPerChunk = 4;
+constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096;
 constexpr std::size_t kRowsPerKernel = 64;
+// Of a world of one block.
+constexpr std::size_t kContactsPerPart = 512, kBodiesPerPart = 1024, kPartsPerChunk = 2;
 
 // The layout that sphere_sweep.hpp assumes.
 constexpr std::size_t kReal = sizeof(Real);
@@ -54,223 +59,472 @@ const cpu::SphereSweepKernels* kernels_for(SimdLevel level) {
 SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
     : pool_(pool), kernels_(kernels_for(usable_simd_level(simd))) {}
 
-/// Counting sort of the contacts and joints into rows by kind and group. Within a group, rows are
-/// ordered by number; rows with fixed bodies are ordered by body.
-void SoftStepSolver::sort_contacts() {
-  count_contacts();
-  Counts before;
-  for (Counts& chunk : counts_) {
-    for (std::uint32_t kind = 0; kind < kRowKinds; ++kind) {
-      const auto add = [sums = &before.by_kind[kind],
-                        counts = &chunk.by_kind[kind]](std::size_t g) {
-        (*sums)[g] += std::exchange((*counts)[g], (*sums)[g]);
-      };
-      for (std::size_t g = 0; g < colored_end_; ++g) add(g);
-      add(kFixedGroup);
-    }
-    before.fixed += std::exchange(chunk.fixed, before.fixed);
-  }
-  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
-    rows->start(before.by_kind[kKindOf<Row>], colored_end_, bodies_);
-  });
-  resize_geometric(&fixed_, before.fixed);
-  parallel_for(pool_, setup_.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
-    place_contacts(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
-                   counts_[first / kContactsPerChunk]);
-  });
-  for_all_kinds([](auto* rows) { rows->finish(); });
-  place_fixed_contacts();
-  place_parts();
-}
-
-/// Fills kinds_, and counts_ by chunk of contacts.
-void SoftStepSolver::count_contacts() {
+/// Fills kinds_ and shape_, and lists the contacts with fixed bodies and in the overflow.
+void SoftStepSolver::inspect_contacts() {
   const std::uint32_t count = setup_.size();
   resize_geometric(&kinds_, count);
-  resize_geometric(&counts_, (count + kContactsPerChunk - 1) / kContactsPerChunk);
-  const auto count_chunk = [this](std::size_t first, std::size_t last) {
-    Counts& counts = counts_[first / kContactsPerChunk];
-    counts = {};
-    std::size_t colored_end = 0;
+  listed_.clear();
+  std::mutex mutex;
+  struct Ends {
+    std::uint32_t inner = 0, crossing = 0;
+  };
+  const auto inspect = [&](std::size_t first, std::size_t last) {
+    Ends ends;
+    std::array<ListedContact, 64> listed;
+    std::size_t listed_count = 0;
+    const auto flush = [&] {
+      if (listed_count == 0) return;
+      const std::lock_guard lock(mutex);
+      listed_.insert(listed_.end(), listed.begin(), listed.begin() + listed_count);
+      listed_count = 0;
+    };
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       kinds_[i] = setup_.kind_of(i);
       if (kinds_[i] == kNoRow) continue;
-      const std::size_t group = setup_.group_of(i);
-      ++counts.by_kind[kinds_[i]][group];
-      if (group == kFixedGroup) {
-        ++counts.fixed;
-      } else {
-        colored_end = std::max(colored_end, group + 1);
+      const std::uint32_t color = setup_.color_of(i);
+      if (color >= kColors) {
+        if (listed_count == listed.size()) flush();
+        listed[listed_count++] = {setup_.movable_body(setup_.key(i)), i, 0, kinds_[i]};
+        continue;
       }
+      std::uint32_t& end = is_of_block(color) ? ends.inner : ends.crossing;
+      end = std::max(end, number_in_class(color) + 1);
     }
-    return colored_end;
+    flush();
+    return ends;
   };
-  colored_end_ = parallel_reduce(pool_, count, kContactsPerChunk, std::size_t{0}, count_chunk,
-                                 std::ranges::max);
+  const Ends ends = parallel_reduce(
+      pool_, count, kContactsPerChunk, Ends{}, inspect, [](const Ends& x, const Ends& y) {
+        return Ends{std::max(x.inner, y.inner), std::max(x.crossing, y.crossing)};
+      });
+  const std::size_t parts = (count + kContactsPerPart - 1) / kContactsPerPart;
+  const std::size_t fixed_parts = (bodies_.size() + kBodiesPerPart - 1) / kBodiesPerPart;
+  shape_ = has_blocks_ ? RowTable::Shape{blocks_.size(), ends.inner, ends.crossing, blocks_.size()}
+                       : RowTable::Shape{parts, 0, ends.crossing, fixed_parts};
 }
 
-/// Assigns rows to the contacts of a chunk. @param before number of rows in earlier chunks
-void SoftStepSolver::place_contacts(std::uint32_t first, std::uint32_t last, Counts before) {
-  for (std::uint32_t i = first; i < last; ++i) {
-    const RowKind kind = kinds_[i];
-    if (kind == kNoRow) continue;
-    const std::size_t group = setup_.group_of(i);
-    const ContactKey key = setup_.key(i);
-    if (group == kFixedGroup) {
-      fixed_[before.fixed++] = {setup_.movable_body(key), i, 0, kind};
-      continue;
-    }
-    visit_row(kind, [&]<class Row>(std::type_identity<Row>) {
-      const std::uint32_t row = rows<Row>().begin(group) + before.by_kind[kind][group]++;
-      rows<Row>().place(group, row, i, std::min(key.a, key.b));
-    });
+/// Finds the contacts of each body a in a list that is sorted by key.
+template <class Contact>
+void SoftStepSolver::find_ranges(const Contact* contacts, std::uint32_t count,
+                                 std::vector<std::uint32_t>* ranges) {
+  if (count == 0) {
+    ranges->clear();
+    return;
   }
+  resize_geometric(ranges, bodies_.size() + 1);
+  std::vector<std::uint32_t>& begin = *ranges;
+  parallel_for(pool_, count, kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+    for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+      const std::uint32_t a = contacts[i].key.a;
+      const std::uint32_t next = i == 0 ? 0 : contacts[i - 1].key.a + 1;
+      for (std::uint32_t body = next; body <= a; ++body) begin[body] = i;
+    }
+  });
+  const std::uint32_t next = contacts[count - 1].key.a + 1;
+  std::fill(begin.begin() + next, begin.end(), count);
 }
 
-/// Sorts the contacts with fixed bodies by movable body, and assigns their rows.
-void SoftStepSolver::place_fixed_contacts() {
-  const auto order = [this](const FixedContact& x, const FixedContact& y) {
-    return x.body != y.body ? x.body < y.body
-                            : setup_.fixed_order(x.contact) < setup_.fixed_order(y.contact);
+/// Sorts the joints of two movable bodies by block.
+void SoftStepSolver::list_joints() {
+  joints_.clear();
+  const std::uint32_t first = setup_.contacts.size();
+  for (std::uint32_t i = first; i < setup_.size(); ++i) {
+    if (kinds_[i] == kNoRow || setup_.color_of(i) >= kColors) continue;
+    joints_.push_back({blocks_.block(setup_.key(i).a), i});
+  }
+  std::ranges::sort(joints_);
+}
+
+std::size_t SoftStepSolver::fixed_part(std::uint32_t body) const {
+  return has_blocks_ ? blocks_.block(body) : body / kBodiesPerPart;
+}
+
+/// Divides the listed contacts into the overflow, and those with fixed bodies by part.
+void SoftStepSolver::group_fixed() {
+  const auto is_overflow = [this](const ListedContact& listed) {
+    return setup_.color_of(listed.contact) == kOverflowColor;
   };
-  if (!std::ranges::is_sorted(fixed_, order)) std::ranges::sort(fixed_, order);
-  std::array<std::uint32_t, kRowKinds> next{};
-  for_all_kinds([&]<class Row>(Rows<Row>* rows) { next[kKindOf<Row>] = rows->begin(kFixedGroup); });
-  for (FixedContact& fixed : fixed_) {
-    fixed.row = next[fixed.kind]++;
-    visit_row(fixed.kind, [&]<class Row>(std::type_identity<Row>) {
-      rows<Row>().contacts[fixed.row] = fixed.contact;
-    });
-  }
-}
-
-/// Assigns parts to the rows of kinds with parts.
-void SoftStepSolver::place_parts() {
-  for_all_kinds([this]<class Row>(Rows<Row>* rows) {
-    if constexpr (kHasParts<Row>) {
-      std::uint32_t parts = 0;
-      for (std::size_t i = 0; i < rows->size(); ++i) {
-        rows->rows[i].first = parts;
-        parts += setup_.contacts.impulse_count(rows->contacts[i]);
-      }
-      rows->parts.reserve_geometric(parts, "points of contacts");
+  overflow_.clear();
+  assign_geometric(&fixed_begin_, shape_.fixed_parts + 2, 0);
+  std::uint32_t count = 0;
+  for (const ListedContact& listed : listed_) {
+    if (is_overflow(listed)) {
+      overflow_.push_back(listed);
+    } else {
+      ++fixed_begin_[fixed_part(listed.body) + 2];
+      ++count;
     }
+  }
+  std::partial_sum(fixed_begin_.begin(), fixed_begin_.end(), fixed_begin_.begin());
+  resize_geometric(&fixed_, count);
+  for (const ListedContact& listed : listed_) {
+    if (!is_overflow(listed)) fixed_[fixed_begin_[fixed_part(listed.body) + 1]++] = listed;
+  }
+  std::ranges::sort(overflow_, [](const ListedContact& x, const ListedContact& y) {
+    return std::tie(x.kind, x.contact) < std::tie(y.kind, y.contact);
   });
 }
 
-void SoftStepSolver::build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
-                           const StepConstants& constants) {
+/// Prefetches the first contacts of spheres of a body. The bodies of a block are scattered, so the
+/// hardware does not predict them.
+void SoftStepSolver::prefetch_contacts(std::uint32_t body) const {
+  if (first_sphere_.empty()) return;
+  const std::uint32_t first = first_sphere_[body];
+  const SphereContactInput* contact = setup_.contacts.spheres + first;
+  const KeptImpulse* impulse = setup_.contacts.impulses + first;
+  for (int k = 0; k < 3; ++k) prefetch(contact + k);
+  prefetch(impulse);
+  prefetch(impulse + 2);
+}
+
+/// Calls f(contact, color) for the contacts of the inner and crossing rows of a part.
+template <class F>
+void SoftStepSolver::for_contacts(std::size_t part, const F& f) const {
+  const auto visit = [&](std::uint32_t contact) {
+    if (kinds_[contact] == kNoRow) return;
+    const std::uint32_t color = setup_.color_of(contact);
+    if (color < kColors) f(contact, color);
+  };
+  if (!has_blocks_) {
+    const std::size_t first = part * kContactsPerPart;
+    const std::size_t last = std::min<std::size_t>(first + kContactsPerPart, setup_.size());
+    for (std::size_t i = first; i < last; ++i) visit(static_cast<std::uint32_t>(i));
+    return;
+  }
+  const std::uint32_t spheres = setup_.contacts.sphere_count;
+  const auto visit_contacts = [&](std::uint32_t body) {
+    if (!first_sphere_.empty()) {
+      for (std::uint32_t i = first_sphere_[body]; i < first_sphere_[body + 1]; ++i) visit(i);
+    }
+    if (!first_manifold_.empty()) {
+      for (std::uint32_t i = first_manifold_[body]; i < first_manifold_[body + 1]; ++i) {
+        visit(spheres + i);
+      }
+    }
+  };
+  blocks_.for_bodies(part, visit_contacts, [this](std::uint32_t body) { prefetch_contacts(body); });
+  const auto block = static_cast<std::uint32_t>(part);
+  for (auto joint = std::ranges::lower_bound(joints_, BlockJoint{block, 0});
+       joint != joints_.end() && joint->block == block; ++joint) {
+    visit(joint->contact);
+  }
+}
+
+/// The rows of a part, by kind: their numbers, or the next ones.
+struct SoftStepSolver::Cursors {
+  struct Kind {
+    std::array<std::uint32_t, kColorsPerClass> inner, crossing;
+    std::uint32_t fixed, part;
+
+    std::uint32_t* at(bool is_of_block, std::uint32_t color) {
+      return &(is_of_block ? inner : crossing)[number_in_class(color)];
+    }
+  };
+  std::array<Kind, kRowKinds> kinds;
+};
+
+/// Counts the rows of a part, and their points.
+void SoftStepSolver::count_rows(std::size_t part) {
+  Cursors counts{};
+  for_contacts(part, [&](std::uint32_t contact, std::uint32_t color) {
+    Cursors::Kind& kind = counts.kinds[kinds_[contact]];
+    ++*kind.at(is_of_block(color), color);
+    if (!setup_.is_joint(contact)) kind.part += setup_.contacts.impulse_count(contact);
+  });
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    const Cursors::Kind& kind = counts.kinds[kKindOf<Row>];
+    RowTable& table = rows->table;
+    for (std::size_t c = 0; c < shape_.inner_colors; ++c) {
+      table.set_size(table.inner(part, c), kind.inner[c]);
+    }
+    for (std::size_t c = 0; c < shape_.crossing_colors; ++c) {
+      table.set_size(table.crossing(part, c), kind.crossing[c]);
+    }
+    if constexpr (kHasParts<Row>) rows->first_part[part] = kind.part;
+  });
+}
+
+void SoftStepSolver::count_fixed_rows(std::size_t part) {
+  Cursors counts{};
+  for (const ListedContact& fixed : fixed_of(part)) {
+    Cursors::Kind& kind = counts.kinds[fixed.kind];
+    ++kind.fixed;
+    if (!setup_.is_joint(fixed.contact)) kind.part += setup_.contacts.impulse_count(fixed.contact);
+  }
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    const Cursors::Kind& kind = counts.kinds[kKindOf<Row>];
+    rows->table.set_size(rows->table.fixed(part), kind.fixed);
+    if constexpr (kHasParts<Row>) rows->first_part[shape_.parts + part] = kind.part;
+  });
+}
+
+/// Assigns the rows of a part to their contacts, and builds them.
+void SoftStepSolver::place_rows(std::size_t part) {
+  Cursors next;
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    Cursors::Kind& kind = next.kinds[kKindOf<Row>];
+    const RowTable& table = rows->table;
+    for (std::size_t c = 0; c < shape_.inner_colors; ++c) {
+      kind.inner[c] = table.begin(table.inner(part, c));
+    }
+    for (std::size_t c = 0; c < shape_.crossing_colors; ++c) {
+      kind.crossing[c] = table.begin(table.crossing(part, c));
+    }
+    if constexpr (kHasParts<Row>) kind.part = rows->first_part[part];
+  });
+  for_contacts(part, [&](std::uint32_t contact, std::uint32_t color) {
+    Cursors::Kind& kind = next.kinds[kinds_[contact]];
+    fill<false>(kinds_[contact], contact, (*kind.at(is_of_block(color), color))++, &kind.part);
+  });
+}
+
+/// place_rows() for rows with fixed bodies, in the order of fixed_.
+void SoftStepSolver::place_fixed_rows(std::size_t part) {
+  Cursors next;
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    Cursors::Kind& kind = next.kinds[kKindOf<Row>];
+    kind.fixed = rows->table.begin(rows->table.fixed(part));
+    if constexpr (kHasParts<Row>) kind.part = rows->first_part[shape_.parts + part];
+  });
+  const std::span<ListedContact> fixed = fixed_of(part);
+  std::ranges::sort(fixed, [this](const ListedContact& x, const ListedContact& y) {
+    return x.body != y.body ? x.body < y.body
+                            : setup_.fixed_order(x.contact) < setup_.fixed_order(y.contact);
+  });
+  for (ListedContact& listed : fixed) {
+    Cursors::Kind& kind = next.kinds[listed.kind];
+    listed.row = kind.fixed++;
+    fill<true>(listed.kind, listed.contact, listed.row, &kind.part);
+  }
+}
+
+/// Builds the row of a contact. @param part next part, for kinds with parts
+template <bool kFixed>
+void SoftStepSolver::fill(RowKind kind, std::uint32_t contact, std::uint32_t row,
+                          std::uint32_t* part) {
+  visit_row(kind, [&]<class Row>(std::type_identity<Row>) {
+    Rows<Row>& all = rows<Row>();
+    Row& r = all.rows[row];
+    if constexpr (kHasParts<Row>) {
+      r.first = *part;
+      *part += setup_.contacts.impulse_count(contact);
+    }
+    all.contacts[row] = contact;
+    setup_.fill<kFixed>(&r, all.parts_of(r), contact);
+  });
+}
+
+void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
+                           std::span<const std::uint32_t> mobile,
+                           std::span<const std::uint32_t> places, bool has_blocks,
+                           const ImpactBodies& impacts, const StepConstants& constants) {
   setup_ = setup;
   impacts_ = impacts;
   constants_ = constants;
   bodies_ = bodies;
-  sort_contacts();
-  for_all_rows([this](auto* rows, std::size_t first, std::size_t last, auto is_fixed) {
-    for (std::size_t i = first; i < last; ++i) {
-      auto& row = rows->rows[i];
-      setup_.fill<decltype(is_fixed)::value>(&row, rows->parts_of(row), rows->contacts[i]);
+  has_blocks_ = has_blocks;
+  if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
+  inspect_contacts();
+  if (has_blocks) {
+    find_ranges(setup_.contacts.spheres, setup_.contacts.sphere_count, &first_sphere_);
+    find_ranges(setup_.contacts.manifolds, setup_.contacts.manifold_count, &first_manifold_);
+    list_joints();
+  }
+  group_fixed();
+  allocate_rows();
+  for_parts(shape_.parts, [this](std::size_t part) { place_rows(part); });
+  for_parts(shape_.fixed_parts, [this](std::size_t part) { place_fixed_rows(part); });
+  place_overflow();
+}
+
+/// Counts the rows, and reserves memory for them.
+void SoftStepSolver::allocate_rows() {
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    rows->table.start(shape_);
+    if constexpr (kHasParts<Row>) {
+      assign_geometric(&rows->first_part, shape_.parts + shape_.fixed_parts + 2, 0);
+    }
+  });
+  for_parts(shape_.parts, [this](std::size_t part) { count_rows(part); });
+  for_parts(shape_.fixed_parts, [this](std::size_t part) { count_fixed_rows(part); });
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    RowTable& table = rows->table;
+    std::uint32_t overflow = 0;
+    for (const ListedContact& listed : overflow_) {
+      if (listed.kind != kKindOf<Row>) continue;
+      ++overflow;
+      if constexpr (kHasParts<Row>) {
+        rows->first_part[shape_.parts + shape_.fixed_parts] +=
+            setup_.contacts.impulse_count(listed.contact);
+      }
+    }
+    table.set_size(table.overflow(), overflow);
+    table.scan();
+    rows->rows.reserve_geometric(table.size(), "rows of contacts");
+    rows->contacts.reserve_geometric(table.size(), "rows of contacts");
+    if constexpr (kHasParts<Row>) {
+      std::vector<std::uint32_t>& first = rows->first_part;
+      std::exclusive_scan(first.begin(), first.end(), first.begin(), 0u);
+      rows->parts.reserve_geometric(first.back(), "points of contacts");
     }
   });
 }
 
-template <class Operation>
-void SoftStepSolver::for_all_rows(const Operation& operation) {
-  parallel_for(
-      pool_, block_count(bodies_), kBlocksPerChunk, [&](std::size_t first, std::size_t last) {
+void SoftStepSolver::place_overflow() {
+  Cursors next;
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    Cursors::Kind& kind = next.kinds[kKindOf<Row>];
+    kind.fixed = rows->table.begin(rows->table.overflow());
+    if constexpr (kHasParts<Row>) kind.part = rows->first_part[shape_.parts + shape_.fixed_parts];
+  });
+  for (ListedContact& listed : overflow_) {
+    Cursors::Kind& kind = next.kinds[listed.kind];
+    listed.row = kind.fixed++;
+    fill<false>(listed.kind, listed.contact, listed.row, &kind.part);
+  }
+}
+
+/// Calls f(part) for all parts.
+template <class F>
+void SoftStepSolver::for_parts(std::size_t parts, const F& f) {
+  const std::size_t chunk = has_blocks_ ? 1 : kPartsPerChunk;
+  parallel_for(pool_, parts, chunk, [&](std::size_t first, std::size_t last) {
+    for (std::size_t part = first; part < last; ++part) f(part);
+  });
+}
+
+/// Calls f(operation, kernel) with the operation of a sweep, if any. The kernel is null if rows of
+/// spheres are solved one by one.
+template <class F>
+void SoftStepSolver::with_operation(Sweep sweep, const F& f) {
+  const cpu::SphereSweepKernels* const k = kernels_;
+  switch (sweep) {
+    case Sweep::warm_start:
+      return f(WarmStart(), k != nullptr ? k->warm_start : nullptr);
+    case Sweep::bias:
+      return f(Solve<true>{constants_}, k != nullptr ? k->solve[1] : nullptr);
+    case Sweep::relax:
+      return f(Solve<false>{constants_}, k != nullptr ? k->solve[0] : nullptr);
+    case Sweep::restitution:
+      return f(Restitute(), static_cast<cpu::SphereSweepFunction>(nullptr));
+  }
+}
+
+template <class Row, class Operation>
+void SoftStepSolver::run_row(Rows<Row>* rows, std::size_t i, const Operation& operation,
+                             auto is_fixed) {
+  Row& row = rows->rows[i];
+  const Mat3* const inertia = setup_.properties.inverse_inertia;
+  RowContext<typename Row::Part, ImpactBodies> context{
+      {&bodies_[row.a], nullptr, &inertia[row.a], nullptr}, rows->parts_of(row), &impacts_};
+  if (Row::kReadsOrientation && row.b == kWorld) {
+    context.bodies.b = &world_;
+    context.bodies.inertia_b = &world_inertia_;
+  } else {
+    context.bodies.b = &bodies_[row.b];
+    context.bodies.inertia_b = &inertia[row.b];
+  }
+  if constexpr (Row::kReadsOrientation) {
+    const Quat* const orientation = setup_.properties.orientation;
+    context.orientations = {&orientation[row.a],
+                            row.b == kWorld ? &world_orientation_ : &orientation[row.b]};
+  }
+  operation.template run<decltype(is_fixed)::value>(&row, context);
+}
+
+/// Solves consecutive rows of two movable bodies, which have no common body.
+template <class Row, class Operation>
+void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t last,
+                              const Operation& operation, cpu::SphereSweepFunction kernel) {
+  if (!std::is_same_v<Row, SphereRow> || kernel == nullptr) {
+    for (std::size_t i = first; i < last; ++i) run_row(rows, i, operation, std::false_type());
+    return;
+  }
+  const cpu::SphereSweep arrays = sphere_sweep();
+  for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
+    std::array<std::uint32_t, kRowsPerKernel> skipped;
+    const std::size_t end = std::min(last, begin + kRowsPerKernel);
+    const std::size_t count = kernel(arrays, begin, end, skipped.data());
+    for (std::size_t k = 0; k < count; ++k) {
+      run_row(rows, skipped[k], operation, std::false_type());
+    }
+  }
+}
+
+void SoftStepSolver::sweep_fixed(std::size_t part, Sweep sweep) {
+  with_operation(sweep, [&](const auto& operation, auto) {
+    for (const ListedContact& listed : fixed_of(part)) {
+      visit_row(listed.kind, [&]<class Row>(std::type_identity<Row>) {
+        run_row(&rows<Row>(), listed.row, operation, std::true_type());
+      });
+    }
+  });
+}
+
+void SoftStepSolver::sweep_inner(std::size_t block, Sweep sweep) {
+  with_operation(sweep, [&](const auto& operation, auto kernel) {
+    for (std::size_t color = 0; color < shape_.inner_colors; ++color) {
+      for_all_kinds([&](auto* rows) {
+        const std::size_t cell = rows->table.inner(block, color);
+        run_rows(rows, rows->table.begin(cell), rows->table.end(cell), operation, kernel);
+      });
+    }
+  });
+}
+
+void SoftStepSolver::sweep_crossing(Sweep sweep) {
+  const std::size_t parts = shape_.parts;
+  with_operation(sweep, [&](const auto& operation, auto kernel) {
+    for (std::size_t color = 0; color < shape_.crossing_colors; ++color) {
+      // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
+      std::size_t count = 0;
+      for_all_kinds([&](auto* rows) {
+        const RowTable& table = rows->table;
+        count +=
+            table.end(table.crossing(parts - 1, color)) - table.begin(table.crossing(0, color));
+      });
+      // All colors are divided at the same parts, so that a thread has most of the bodies in its
+      // cache.
+      const std::size_t chunk = std::max<std::size_t>(1, parts * kRowsPerChunk / (count + 1));
+      parallel_for(pool_, parts, chunk, [&](std::size_t first, std::size_t last) {
         for_all_kinds([&](auto* rows) {
-          for (std::size_t group = 0; group < colored_end_; ++group) {
-            operation(rows, rows->begin(group, first), rows->begin(group, last), std::false_type());
-          }
+          const RowTable& table = rows->table;
+          run_rows(rows, table.begin(table.crossing(first, color)),
+                   table.end(table.crossing(last - 1, color)), operation, kernel);
         });
       });
-  for_all_kinds([&](auto* rows) {
-    const std::size_t begin = rows->begin(kFixedGroup);
-    parallel_for(pool_, rows->size(kFixedGroup), kRowsPerChunk,
-                 [&](std::size_t first, std::size_t last) {
-                   operation(rows, begin + first, begin + last, std::true_type());
-                 });
+    }
   });
 }
 
-template <class Run, class OnFixed>
-void SoftStepSolver::sweep(const Run& run, const OnFixed& on_fixed) {
-  for_all_kinds([&](auto* rows) {
-    for (std::size_t i = 0; i < rows->end(kOverflowGroup); ++i) run(rows, i, i + 1);
+void SoftStepSolver::sweep_overflow(Sweep sweep) {
+  with_operation(sweep, [&](const auto& operation, auto kernel) {
+    for (const ListedContact& listed : overflow_) {
+      visit_row(listed.kind, [&]<class Row>(std::type_identity<Row>) {
+        run_rows(&rows<Row>(), listed.row, listed.row + 1, operation, kernel);
+      });
+    }
   });
-  const std::size_t blocks = block_count(bodies_);
-  for (std::size_t group = group_of_color(0); group < colored_end_; ++group) {
-    // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
-    std::size_t count = 0;
-    for_all_kinds([&](auto* rows) { count += rows->size(group); });
-    if (count == 0) continue;
-    const std::size_t chunk = std::max<std::size_t>(1, blocks * kRowsPerChunk / count);
-    parallel_for(pool_, blocks, chunk, [&](std::size_t first, std::size_t last) {
-      for_all_kinds(
-          [&](auto* rows) { run(rows, rows->begin(group, first), rows->begin(group, last)); });
-    });
+}
+
+void SoftStepSolver::sweep(Sweep sweep) {
+  sweep_overflow(sweep);
+  if (shape_.inner_colors > 0) {
+    for_parts(shape_.parts, [&](std::size_t block) { sweep_inner(block, sweep); });
   }
-  parallel_for(pool_, fixed_.size(), kRowsPerChunk, [&](std::size_t first, std::size_t last) {
-    // A chunk begins and ends at the first contact of a body.
-    const auto is_inside = [this](std::size_t i) {
-      return i > 0 && i < fixed_.size() && fixed_[i].body == fixed_[i - 1].body;
-    };
-    while (is_inside(first)) ++first;
-    while (is_inside(last)) ++last;
-    for (std::size_t i = first; i < last; ++i) {
-      visit_row(fixed_[i].kind,
-                [&]<class Row>(std::type_identity<Row>) { on_fixed(&rows<Row>(), fixed_[i].row); });
-    }
-  });
+  sweep_crossing(sweep);
+  if (!fixed_.empty()) {
+    for_parts(shape_.fixed_parts, [&](std::size_t part) { sweep_fixed(part, sweep); });
+  }
 }
 
-/// @param kernel null: rows of spheres are solved one by one
-template <class Operation>
-void SoftStepSolver::run(std::span<SolverBody> bodies, const Operation& operation,
-                         cpu::SphereSweepFunction kernel) {
-  const auto one = [&](auto* rows, std::size_t i, auto is_fixed) {
-    auto& row = rows->rows[i];
-    using Row = std::remove_reference_t<decltype(row)>;
-    const Mat3* const inertia = setup_.properties.inverse_inertia;
-    RowContext<typename Row::Part, ImpactBodies> context{
-        {&bodies[row.a], nullptr, &inertia[row.a], nullptr}, rows->parts_of(row), &impacts_};
-    if (Row::kReadsOrientation && row.b == kWorld) {
-      context.bodies.b = &world_;
-      context.bodies.inertia_b = &world_inertia_;
-    } else {
-      context.bodies.b = &bodies[row.b];
-      context.bodies.inertia_b = &inertia[row.b];
-    }
-    if constexpr (Row::kReadsOrientation) {
-      const Quat* const orientation = setup_.properties.orientation;
-      context.orientations = {&orientation[row.a],
-                              row.b == kWorld ? &world_orientation_ : &orientation[row.b]};
-    }
-    operation.template run<decltype(is_fixed)::value>(&row, context);
-  };
-  const cpu::SphereSweep arrays = arrays_of(bodies);
-  sweep(
-      [&]<class Row>(Rows<Row>* rows, std::size_t first, std::size_t last) {
-        if (!std::is_same_v<Row, SphereRow> || kernel == nullptr) {
-          for (std::size_t i = first; i < last; ++i) one(rows, i, std::false_type());
-          return;
-        }
-        for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
-          std::array<std::uint32_t, kRowsPerKernel> skipped;
-          const std::size_t end = std::min(last, begin + kRowsPerKernel);
-          const std::size_t count = kernel(arrays, begin, end, skipped.data());
-          for (std::size_t k = 0; k < count; ++k) one(rows, skipped[k], std::false_type());
-        }
-      },
-      [&](auto* rows, std::size_t row) { one(rows, row, std::true_type()); });
-}
-
-cpu::SphereSweep SoftStepSolver::arrays_of(std::span<SolverBody> bodies) {
+cpu::SphereSweep SoftStepSolver::sphere_sweep() {
   const StepConstants& c = constants_;
   const auto softness = [](const Softness& s) {
     return cpu::SweepSoftness{s.bias_rate, s.mass_scale, s.impulse_scale};
   };
   return {reinterpret_cast<Real*>(rows<SphereRow>().rows.data()),
-          reinterpret_cast<Real*>(bodies.data()),
+          reinterpret_cast<Real*>(bodies_.data()),
           c.h,
           c.inverse_h,
           c.push_out_speed,
@@ -281,29 +535,15 @@ cpu::SphereSweep SoftStepSolver::arrays_of(std::span<SolverBody> bodies) {
           kDeepPenetration};
 }
 
-void SoftStepSolver::warm_start(std::span<SolverBody> bodies) {
-  run(bodies, WarmStart(), kernels_ != nullptr ? kernels_->warm_start : nullptr);
-}
-
-void SoftStepSolver::solve(std::span<SolverBody> bodies, bool use_bias) {
-  const cpu::SphereSweepFunction kernel = kernels_ != nullptr ? kernels_->solve[use_bias] : nullptr;
-  if (use_bias) {
-    run(bodies, Solve<true>{constants_}, kernel);
-  } else {
-    run(bodies, Solve<false>{constants_}, kernel);
-  }
-}
-
-void SoftStepSolver::restitute(std::span<SolverBody> bodies) {
-  if (rows<ManifoldRow>().size() > 0) run(bodies, Restitute(), nullptr);
-}
-
 void SoftStepSolver::store() {
-  for_all_rows([this](auto* rows, std::size_t first, std::size_t last, auto) {
-    for (std::size_t i = first; i < last; ++i) {
-      const auto& row = rows->rows[i];
-      setup_.store(row, rows->parts_of(row), rows->contacts[i]);
-    }
+  for_all_kinds([this](auto* rows) {
+    parallel_for(pool_, rows->table.size(), kContactsPerChunk,
+                 [&](std::size_t first, std::size_t last) {
+                   for (std::size_t i = first; i < last; ++i) {
+                     const auto& row = rows->rows[i];
+                     setup_.store(row, rows->parts_of(row), rows->contacts[i]);
+                   }
+                 });
   });
 }
 

@@ -1,11 +1,12 @@
-/// Sweeps of the soft step over the contacts of all colors.
+/// Sweeps of the soft step on the CPU.
 #pragma once
 
 #include <jfpx/simd_level.hpp>
 
 #include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
-#include "src/contact_solver/soft_step/cpu/grouped_rows.hpp"
+#include "src/contact_solver/soft_step/cpu/body_blocks.hpp"
+#include "src/contact_solver/soft_step/cpu/row_table.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
 
@@ -20,14 +21,27 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
+/// A sweep over all rows.
+enum class Sweep : std::uint8_t {
+  warm_start,  ///< applies the impulses of the last step
+  bias,
+  relax,
+  restitution  ///< of manifolds; rows of spheres rebound in the bias and relax sweeps
+};
+
 /// Solves contacts and joints in this order: the overflow (rows without a free color), one after
-/// the other; the colors in ascending order; rows with immovable or kinematic bodies or with the
-/// world, by movable body, joints first. In the overflow, rows have the order of RowTypes. Rows of
-/// one color share no movable body, so threads may solve them in any order. The same holds for rows
-/// of different movable bodies with fixed bodies.
+/// the other; the inner rows, by color; the crossing rows, by color; rows with immovable or
+/// kinematic bodies or with the world, by movable body, joints first. In the overflow, rows have
+/// the order of RowTypes. Rows of one color share no movable body, and inner rows of different
+/// blocks neither, so threads may solve them in any order. The same holds for rows of different
+/// movable bodies with fixed bodies.
 ///
-/// Owns its buffers, which grow and never shrink. In a step: build(), then warm_start(), solve()
-/// and restitute() as the integrator requires, then store().
+/// Contacts are divided into parts: blocks, or ranges of contacts in a world of one block. A thread
+/// solves all inner rows of a block, so that the bodies stay in the cache of a core; threads share
+/// the colors of crossing rows, and those of a world of one block.
+///
+/// Owns its buffers, which grow and never shrink. In a step: build(), then sweep() as the
+/// integrator requires, then store().
 class SoftStepSolver {
  public:
   /// @param pool not null; outlives the solver
@@ -36,26 +50,34 @@ class SoftStepSolver {
 
   /// Builds rows of the contacts and joints whose kind is not kNoRow. Below, "contact" is the
   /// number of a contact or joint; see RowSetup.
-  /// @param setup     its arrays must be valid until store()
-  /// @param bodies    number of bodies in these arrays
-  void build(const RowSetup& setup, std::size_t bodies, const ImpactBodies& impacts,
-             const StepConstants& constants);
-  /// Applies the impulses of the last step.
-  void warm_start(std::span<SolverBody> bodies);
-  /// A sweep over all contacts. @param use_bias whether it is a bias sweep or a relax sweep
-  void solve(std::span<SolverBody> bodies, bool use_bias);
-  /// Applies restitution. Rows of spheres have already rebounded in solve().
-  void restitute(std::span<SolverBody> bodies);
+  /// @param setup  its arrays must be valid until store()
+  /// @param bodies by index; must be valid until the last sweep
+  /// @param places by index
+  /// @param mobile indices of the bodies that are not immovable, ascending
+  /// @param has_blocks whether the world has several blocks; otherwise threads share the colors
+  void build(const RowSetup& setup, std::span<SolverBody> bodies,
+             std::span<const std::uint32_t> mobile, std::span<const std::uint32_t> places,
+             bool has_blocks, const ImpactBodies& impacts, const StepConstants& constants);
+  /// A sweep over all rows.
+  void sweep(Sweep sweep);
+  /// Whether a restitution sweep has an effect.
+  bool needs_restitution() const { return rows<ManifoldRow>().table.size() > 0; }
   /// Writes the impulses to the contacts that build() received.
   void store();
 
  private:
   /// The rows of a kind.
   template <class RowOfKind>
-  struct Rows : GroupedRows<RowOfKind> {
+  struct Rows {
     using Row = RowOfKind;
     using Part = typename Row::Part;
+    RowTable table;
+    Buffer<Row> rows;
+    Buffer<std::uint32_t> contacts;  ///< by row
     Buffer<Part> parts;
+    /// First of `parts` by part of the contacts, by part of the fixed contacts, then of the
+    /// overflow, and the end.
+    std::vector<std::uint32_t> first_part;
 
     Part* parts_of(const Row& row) {
       if constexpr (kHasParts<Row>) {
@@ -71,21 +93,28 @@ class SoftStepSolver {
   struct RowsOfTypes<std::tuple<Row...>> {
     using type = std::tuple<Rows<Row>...>;
   };
-  /// A contact with a fixed body.
-  struct FixedContact {
+  /// A contact with a fixed body, or in the overflow.
+  struct ListedContact {
     std::uint32_t body = 0;  ///< the movable one
     std::uint32_t contact = 0;
     std::uint32_t row = 0;
     RowKind kind = kNoRow;
   };
-  /// Numbers of rows of a chunk of contacts, by kind and group.
-  struct Counts {
-    std::array<GroupCounts, kRowKinds> by_kind{};
-    std::uint32_t fixed = 0;
+  /// A joint of two movable bodies.
+  struct BlockJoint {
+    std::uint32_t block = 0;    ///< of body a
+    std::uint32_t contact = 0;  ///< its number
+    friend auto operator<=>(const BlockJoint&, const BlockJoint&) = default;
   };
+  /// The next rows and parts of a block, while its rows are placed.
+  struct Cursors;
 
   template <class Row>
   Rows<Row>& rows() {
+    return std::get<Rows<Row>>(rows_);
+  }
+  template <class Row>
+  const Rows<Row>& rows() const {
     return std::get<Rows<Row>>(rows_);
   }
   /// Calls f(&rows<Row>()) for all kinds of rows.
@@ -94,38 +123,63 @@ class SoftStepSolver {
     std::apply([&f](auto&... rows) { (f(&rows), ...); }, rows_);
   }
 
-  void sort_contacts();
-  void count_contacts();
-  void place_contacts(std::uint32_t first, std::uint32_t last, Counts before);
-  void place_fixed_contacts();
-  void place_parts();
-  /// Calls run(rows, first, last) for the rows of the overflow and of the colors, and
-  /// on_fixed(rows, row) for each row with a fixed body. Overflow rows may share bodies and are
-  /// passed one at a time. `rows` is a pointer to Rows.
-  template <class Run, class OnFixed>
-  void sweep(const Run& run, const OnFixed& on_fixed);
-  /// Calls operation(rows, first, last, is_fixed) for ranges of all rows. `rows` is a pointer to
-  /// Rows; `is_fixed` is std::true_type if body b is fixed and std::false_type otherwise. The rows
-  /// of a block of bodies are consecutive, because their contacts are.
-  template <class Operation>
-  void for_all_rows(const Operation& operation);
-  template <class Operation>
-  void run(std::span<SolverBody> bodies, const Operation& operation,
-           cpu::SphereSweepFunction kernel);
-  cpu::SphereSweep arrays_of(std::span<SolverBody> bodies);
+  void inspect_contacts();
+  template <class Contact>
+  void find_ranges(const Contact* contacts, std::uint32_t count, std::vector<std::uint32_t>* first);
+  void list_joints();
+  void group_fixed();
+  void count_rows(std::size_t part);
+  void count_fixed_rows(std::size_t part);
+  void allocate_rows();
+  void place_rows(std::size_t part);
+  void place_fixed_rows(std::size_t part);
+  void place_overflow();
+  template <bool kFixed>
+  void fill(RowKind kind, std::uint32_t contact, std::uint32_t row, std::uint32_t* part);
+  template <class F>
+  void for_parts(std::size_t parts, const F& f);
+  void prefetch_contacts(std::uint32_t body) const;
+  template <class F>
+  void for_contacts(std::size_t part, const F& f) const;
+  std::size_t fixed_part(std::uint32_t body) const;
+  std::span<ListedContact> fixed_of(std::size_t part) {
+    return std::span(fixed_).subspan(fixed_begin_[part],
+                                     fixed_begin_[part + 1] - fixed_begin_[part]);
+  }
+
+  /// Whether the rows of a color below kColors belong to a block.
+  bool is_of_block(std::uint32_t color) const { return has_blocks_ && is_inner_color(color); }
+  template <class F>
+  void with_operation(Sweep sweep, const F& f);
+  template <class Row, class Operation>
+  void run_row(Rows<Row>* rows, std::size_t row, const Operation& operation, auto is_fixed);
+  template <class Row, class Operation>
+  void run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, const Operation& operation,
+                cpu::SphereSweepFunction kernel);
+  void sweep_fixed(std::size_t part, Sweep sweep);
+  void sweep_inner(std::size_t block, Sweep sweep);
+  void sweep_crossing(Sweep sweep);
+  void sweep_overflow(Sweep sweep);
+  cpu::SphereSweep sphere_sweep();
 
   ThreadPool* pool_;
   const cpu::SphereSweepKernels* kernels_;  ///< null: rows are solved one by one
   RowSetup setup_;                          ///< from build() to store()
   ImpactBodies impacts_;
   StepConstants constants_;
-  std::size_t bodies_ = 0;  ///< number of bodies, including those of mass 0
+  std::span<SolverBody> bodies_;
+  BodyBlocks blocks_;
+  bool has_blocks_ = false;
 
-  std::vector<RowKind> kinds_;  ///< by contact
-  std::vector<Counts> counts_;  ///< by chunk of contacts
+  std::vector<RowKind> kinds_;                                ///< by contact
+  std::vector<std::uint32_t> first_sphere_, first_manifold_;  ///< by body a, and the end
+  std::vector<BlockJoint> joints_;                            ///< sorted
+  std::vector<ListedContact> fixed_;        ///< by part, then by (body, RowSetup::fixed_order())
+  std::vector<std::uint32_t> fixed_begin_;  ///< by part, and the end
+  std::vector<ListedContact> overflow_;     ///< sorted by (kind, contact)
+  std::vector<ListedContact> listed_;       ///< unsorted
+  RowTable::Shape shape_;
   RowsOfTypes<RowTypes>::type rows_;
-  std::size_t colored_end_ = 0;      ///< end of the overflow and of the occurring colors, as groups
-  std::vector<FixedContact> fixed_;  ///< sorted by (body, RowSetup::fixed_order())
   // Body b of a joint with the world.
   SolverBody world_;
   Mat3 world_inertia_;

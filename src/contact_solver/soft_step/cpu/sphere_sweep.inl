@@ -77,12 +77,14 @@ class RowLanes {
   using Vec = typename S::Vec;
   using Vectors = Vec3Lanes<S>;
   using Quads = QuadLanes<S>;
-  static constexpr unsigned kLanes = S::kLanes, kAll = (1u << kLanes) - 1;
+  static constexpr unsigned kLanes = S::kLanes;
 
-  RowLanes(const SphereSweep& sweep, std::size_t first) : sweep_(sweep) {
+  /// @param count number of rows; the other lanes repeat the last row and are not stored
+  RowLanes(const SphereSweep& sweep, std::size_t first, unsigned count)
+      : sweep_(sweep), used_((1u << count) - 1) {
     for (unsigned k = 0; k < kLanes; ++k) {
-      const RowBodies row(sweep, first + k);
-      rows_[k] = static_cast<std::uint32_t>(first) + k;
+      rows_[k] = static_cast<std::uint32_t>(first) + (k < count ? k : count - 1);
+      const RowBodies row(sweep, rows_[k]);
       a_[k] = row.a;
       b_[k] = row.b;
     }
@@ -94,8 +96,8 @@ class RowLanes {
     BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
     apply(normal.vector, arms.vector,
           normal.vector * S::absolute(impulses.scalar) + impulses.vector, impulses.vector, &a, &b);
-    a.store(sweep_, a_, kAll);
-    b.store(sweep_, b_, kAll);
+    a.store(sweep_, a_, used_);
+    b.store(sweep_, b_, used_);
   }
 
   /// @returns one bit per lane: whether the bodies may rebound. These rows are skipped.
@@ -117,7 +119,7 @@ class RowLanes {
     const Vec separation =
         normal_distance.scalar + Vectors::dot(shift_a.vector - shift_b.vector, normal);
     const typename S::Mask is_apart = S::less(zero, separation);
-    unsigned lanes = kAll;
+    unsigned lanes = used_;
     if constexpr (!kUseBias) {
       lanes &= ~(S::bits(is_apart) & ~S::bits(S::less(zero, impulse_before)));
     }
@@ -200,6 +202,7 @@ class RowLanes {
   }
 
   const SphereSweep& sweep_;
+  unsigned used_;  ///< one bit per lane with a row
   std::uint32_t rows_[kLanes], a_[kLanes], b_[kLanes];
 };
 
@@ -214,29 +217,33 @@ void prefetch_bodies(const SphereSweep& sweep, std::size_t first, std::size_t co
   }
 }
 
-/// Calls one(first) for all vectors of rows. @returns as SphereSweepFunction
+/// Calls one(first, count) for all vectors of rows, of which the last may be incomplete. @returns
+/// as SphereSweepFunction
 template <unsigned kLanes, class One>
 std::size_t for_each_vector(const SphereSweep& sweep, std::size_t first, std::size_t last,
                             std::uint32_t* left, const One& one) {
   constexpr std::size_t kAhead = 2 * kLanes;  // some hundred nanoseconds
   prefetch_bodies(sweep, first, kAhead, last);
   std::size_t count = 0;
+  const auto add = [&](std::size_t i, unsigned lanes) {
+    for (; lanes != 0; lanes &= lanes - 1) {
+      left[count++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(lanes));
+    }
+  };
   std::size_t i = first;
   for (; i + kLanes <= last; i += kLanes) {
     prefetch_bodies(sweep, i + kAhead, kLanes, last);
-    for (unsigned lanes = one(i); lanes != 0; lanes &= lanes - 1) {
-      left[count++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(lanes));
-    }
+    add(i, one(i, kLanes));
   }
-  for (; i < last; ++i) left[count++] = static_cast<std::uint32_t>(i);
+  if (i < last) add(i, one(i, static_cast<unsigned>(last - i)));
   return count;
 }
 
 template <class S>
 std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t last,
                        std::uint32_t* left) {
-  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i) {
-    RowLanes<S>(sweep, i).warm_start();
+  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i, unsigned rows) {
+    RowLanes<S>(sweep, i, rows).warm_start();
     return 0u;
   });
 }
@@ -244,8 +251,8 @@ std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t 
 template <class S, bool kUseBias>
 std::size_t solve(const SphereSweep& sweep, std::size_t first, std::size_t last,
                   std::uint32_t* left) {
-  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i) {
-    return RowLanes<S>(sweep, i).template solve<kUseBias>();
+  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i, unsigned rows) {
+    return RowLanes<S>(sweep, i, rows).template solve<kUseBias>();
   });
 }
 

@@ -1,0 +1,426 @@
+/// Substeps and restitution of a soft step on a device, for worlds that are divided into blocks.
+#pragma once
+
+#include "src/world/device/block_motion.hpp"
+#include "src/world/device/inner_bodies.hpp"
+#include "src/world/device/row_solver.hpp"
+#include "src/world/device/step_data.hpp"
+#include "src/world/device/sweep.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Number of kinds of rows of a step in which all rows are of spheres.
+inline constexpr soft_step::RowKind kSphereRowKinds = soft_step::kKindOf<soft_step::SphereRow> + 1;
+
+/// Work of the blocks between the crossing rows of two sweeps. It completes the sweep before, with
+/// the rows with fixed bodies, and the substep, and solves the inner rows of a sweep.
+struct BlockPhase {
+  SweepList sweeps;
+  std::uint32_t sweep = 0;  ///< of the inner rows
+  bool has_bodies = true;   ///< whether the sweep before is completed
+  bool has_rows = true;     ///< whether inner rows are solved
+
+  /// The ticket of the bodies before and after the work.
+  JFPX_HD std::uint32_t ticket_before(std::uint64_t colors) const {
+    if (!has_bodies || sweep == 0) return Tickets::before_sweep(sweep);
+    return Tickets(sweep - 1, colors).last();
+  }
+  JFPX_HD std::uint32_t ticket_after() const {
+    return has_rows ? Tickets(sweep, 0).first : Tickets::before_sweep(sweep);
+  }
+  JFPX_HD BodyStage stage() const {
+    return has_bodies ? sweeps.stage_before(sweep) : BodyStage::none;
+  }
+  JFPX_HD SweepKind inner_sweep() const { return has_rows ? sweeps.kind(sweep) : SweepKind::none; }
+  /// Sweep of the rows with fixed bodies.
+  JFPX_HD SweepKind fixed_sweep() const {
+    return has_bodies && sweep > 0 ? sweeps.kind(sweep - 1) : SweepKind::none;
+  }
+};
+
+/// Sweeps over all rows, as soft_step::SoftStepSolver, in one launch.
+///
+/// A block of threads solves the inner rows of a block of bodies in shared memory. Before them, it
+/// completes the sweep before, with the rows of these bodies with fixed bodies, and the substep.
+/// Crossing rows follow without barriers between their colors: a row waits only for the earlier
+/// crossing rows of its two bodies (see Tickets). Blocks and rows exchange only the motion of
+/// bodies, and all other arrays by body are constant or written only by the threads of its block.
+///
+/// There is no deadlock: the items of a thread have the order of the colors, and each waits only
+/// for earlier ones in this order, so the first incomplete item is always ready.
+/// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program with
+/// fewer
+///   kinds needs fewer registers and less shared memory
+template <soft_step::RowKind kKinds>
+struct BlockSolveProgram : RowSolver<kKinds> {
+  using Motion = BlockMotion<kKinds>;
+  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
+  static constexpr std::size_t kSharedBytes = Motion::kBytes;
+  using RowSolver<kKinds>::data;
+
+  /// The sequence is that of SoftStep::solve(). BodyCells depends on the number of sweeps.
+  template <class Team>
+  [[gnu::always_inline]] JFPX_HD void operator()(const Team& team) const {
+    if (data.has_failed() || !is_selected()) return;
+    const StepData& d = data;
+    Sweep sweep(team.cached_bins(d.counters->bin_begin));
+    const SweepList sweeps{d.substeps, d.counters->any_rebound != 0};
+    const bool has_overflow = sweep.overflow() > 0;
+    for (std::uint32_t s = 0; s <= sweeps.size(); ++s) {
+      sweep.number = s;
+      sweep.stores_impulses = sweeps.stores_impulses(s);
+      BlockPhase phase{.sweeps = sweeps, .sweep = s};
+      if (has_overflow && s < sweeps.size()) {
+        phase.has_rows = false;
+        run_blocks(team, sweep, phase);
+        team.sync();
+        team.once([&] {
+          visit_operation(sweeps.kind(s), [&](const auto& operation) {
+            this->run_overflow(sweep, operation, Tickets::before_sweep(s));
+          });
+        });
+        team.sync();
+        phase.has_rows = true;
+        phase.has_bodies = false;
+      }
+      run_blocks(team, sweep, phase);
+      // Thousands of threads that wait for their rows would delay the blocks.
+      team.sync();
+      visit_operation(sweeps.kind(s), [&](const auto& operation) {
+        using Operation = std::remove_cvref_t<decltype(operation)>;
+        team.run_dataflow(sweep.colored_items,
+                          typename Base::template RowDataflow<Operation>(*this, sweep, operation));
+      });
+      team.sync();
+    }
+    team.for_each_nowait(d.step.bodies.count, [&](std::uint32_t i) {
+      this->finish_kinematic(d.step.bodies.ids[i].index);
+    });
+  }
+
+ private:
+  using Base = RowSolver<kKinds>;
+  using typename Base::BodyFree, typename Base::Impact, typename Base::ItemBody,
+      typename Base::SolverBody;
+
+  /// Whether this program has the kinds of rows of the step, and no program with fewer kinds has.
+  JFPX_HD bool is_selected() const {
+    const StepData& d = data;
+    constexpr soft_step::RowKind kManifold = soft_step::kKindOf<soft_step::ManifoldRow>;
+    if (d.world_joints.count > 0) return kKinds == soft_step::kRowKinds;
+    const std::uint32_t* begin = d.counters->bin_begin;
+    const std::uint32_t manifolds = begin[soft_step::bin_of(kManifold + 1u, 0)] -
+                                    begin[soft_step::bin_of(kManifold, 0)] +
+                                    d.counters->inner_rows[kManifold];
+    return kKinds == (manifolds > 0 ? soft_step::kContactRowKinds : kSphereRowKinds);
+  }
+
+  /// Calls f(operation) with the operation of a sweep, if there is one.
+  template <class F>
+  [[gnu::always_inline]] JFPX_HD void visit_operation(SweepKind kind, const F& f) const {
+    switch (kind) {
+      case SweepKind::none:
+        return;
+      case SweepKind::warm_start:
+        return f(soft_step::WarmStart{});
+      case SweepKind::bias:
+        return f(soft_step::Solve<true>{data.constants});
+      case SweepKind::relax:
+        return f(soft_step::Solve<false>{data.constants});
+      case SweepKind::restitution:
+        return f(soft_step::Restitute{});
+    }
+  }
+
+  template <class Team>
+  [[gnu::always_inline]] JFPX_HD void run_blocks(const Team& team, const Sweep& sweep,
+                                                 const BlockPhase& phase) const {
+    Sweep before = sweep;
+    if (phase.sweep > 0) {
+      before.number = phase.sweep - 1;
+      before.stores_impulses = phase.sweeps.stores_impulses(before.number);
+    }
+    team.for_blocks(data.block_count(), [&](std::uint32_t block, const auto& threads) {
+      run_block(threads, before, phase, block);
+    });
+  }
+
+  /// @param before the sweep before, whose rows with fixed bodies are solved
+  template <class Threads>
+  [[gnu::always_inline]] JFPX_HD void run_block(const Threads& threads, const Sweep& before,
+                                                const BlockPhase& phase,
+                                                std::uint32_t block) const {
+    const StepData& d = data;
+    const Range places = d.places_of(block);
+    const std::uint32_t count = places.end - places.begin;
+    const Motion motion(threads.shared(kSharedBytes));
+    const bool has_inner = phase.inner_sweep() != SweepKind::none && block < d.placed_blocks();
+    threads.for_each(count, [&](std::uint32_t i) {
+      const std::uint32_t body = d.body_at[places.begin + i];
+      if (body != kNone) complete_body(before, phase, motion, i, body);
+    });
+    if (has_inner) {
+      constexpr std::uint32_t kEnds = soft_step::kColorsPerClass + 1u;
+      threads.for_each(kKinds * kEnds, [&](std::uint32_t i) {
+        const auto kind = static_cast<soft_step::RowKind>(i / kEnds);
+        motion.row_begin(kind)[i % kEnds] = d.inner_begin(block, kind)[i % kEnds];
+      });
+    }
+    if (phase.stage() == BodyStage::finish) return;
+    threads.sync();
+    if (has_inner) {
+      visit_operation(phase.inner_sweep(), [&](const auto& operation) {
+        solve_inner(threads, phase, operation, motion, places.begin);
+      });
+    }
+    threads.for_each(count, [&](std::uint32_t i) { publish(phase, motion, i, places.begin + i); });
+  }
+
+  /// Solves the inner rows of a block.
+  template <class Threads, class Operation>
+  [[gnu::always_inline]] JFPX_HD void solve_inner(const Threads& threads, const BlockPhase& phase,
+                                                  const Operation& operation, const Motion& motion,
+                                                  std::uint32_t first_place) const {
+    if constexpr (kKinds == kSphereRowKinds) {
+      solve_inner_spheres(threads, phase, operation, motion, first_place);
+    } else {
+      solve_inner_kinds(threads, phase, operation, motion, first_place);
+    }
+  }
+
+  /// solve_inner() for rows of several kinds.
+  template <class Threads, class Operation>
+  [[gnu::always_inline]] JFPX_HD void solve_inner_kinds(const Threads& threads,
+                                                        const BlockPhase& phase,
+                                                        const Operation& operation,
+                                                        const Motion& motion,
+                                                        std::uint32_t first_place) const {
+    const StepData& d = data;
+    for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+      bool has_rows = false, is_complete = true;
+      const auto solve = [&](auto kind) {
+        using Row = std::tuple_element_t<decltype(kind)::value, soft_step::RowTypes>;
+        const std::uint32_t* begin = motion.row_begin(kind);
+        const std::uint32_t first = begin[color], rows = begin[color + 1] - first;
+        is_complete = is_complete && begin[soft_step::kColorsPerClass] == first;
+        has_rows = has_rows || rows > 0;
+        threads.for_each(rows, [&](std::uint32_t i) {
+          const std::uint32_t r = first + i;
+          if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+            solve_inner_row(phase, operation, motion, first_place, r, d.sphere_rows.load(r));
+          } else {
+            solve_inner_row(phase, operation, motion, first_place, r, d.template rows<Row>()[r]);
+          }
+        });
+      };
+      for_kinds(solve);
+      if (is_complete) return;
+      if (has_rows) threads.sync();
+    }
+  }
+
+  /// solve_inner() if all rows are of spheres. A thread loads its next row before it solves a row.
+  template <class Threads, class Operation>
+  [[gnu::always_inline]] JFPX_HD void solve_inner_spheres(const Threads& threads,
+                                                          const BlockPhase& phase,
+                                                          const Operation& operation,
+                                                          const Motion& motion,
+                                                          std::uint32_t first_place) const {
+    const std::uint32_t* const begin = motion.row_begin(0);
+    const std::uint32_t last = begin[soft_step::kColorsPerClass];
+    threads.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
+      soft_step::SphereRow ahead;
+      std::uint32_t next = 0;
+      const auto load = [&](std::uint32_t color, std::uint32_t row) {
+        next = row;
+        while (next >= begin[color + 1] && begin[color + 1] < last) {
+          ++color;
+          next = begin[color] + thread;
+        }
+        if (next < last) ahead = data.sphere_rows.load(next);
+      };
+      if (begin[0] < last) load(0, begin[0] + thread);
+      for (std::uint32_t color = 0; begin[color] < last; ++color) {
+        while (next < begin[color + 1]) {
+          const soft_step::SphereRow row = ahead;
+          const std::uint32_t r = next;
+          load(color, r + count);
+          solve_inner_row(phase, operation, motion, first_place, r, row);
+        }
+        sync();
+      }
+    });
+  }
+
+  /// Calls f with each kind as a constant.
+  template <class F>
+  JFPX_HD static void for_kinds(const F& f) {
+    [&]<std::size_t... kKind>(std::index_sequence<kKind...>) {
+      (f(std::integral_constant<soft_step::RowKind, kKind>()), ...);
+    }
+    (std::make_index_sequence<kKinds>());
+  }
+
+  template <class Row, class Operation>
+  JFPX_HD void solve_inner_row(const BlockPhase& phase, const Operation& operation,
+                               const Motion& motion, std::uint32_t first_place, std::uint32_t r,
+                               Row row) const {
+    const StepData& d = data;
+    constexpr bool kIsSphere = std::is_same_v<Row, soft_step::SphereRow>;
+    const InnerBodies inner = InnerBodies::of(row);
+    const std::uint32_t* const body_at = d.body_at + first_place;
+    SolverBody a = motion.load(inner.a), b = motion.load(inner.b);
+    const Vec3 shift_a = a.shift, shift_b = b.shift;
+    row.a = inner.a, row.b = inner.b;
+    const Impact impact{{d.step.bodies.last_acceleration, body_at}, row.a};
+    soft_step::RowContext<typename Row::Part, Impact> context{
+        {&a, &b, nullptr, nullptr}, d.parts_of(row), &impact};
+    Mat3 inertia_a, inertia_b;
+    if constexpr (!kIsSphere) {
+      inertia_a = d.step.bodies.inverse_inertia[body_at[inner.a]];
+      inertia_b = d.step.bodies.inverse_inertia[body_at[inner.b]];
+      context.bodies.inertia_a = &inertia_a;
+      context.bodies.inertia_b = &inertia_b;
+    }
+    Quat orientation_a, orientation_b;
+    if constexpr (Row::kReadsOrientation) {
+      const std::uint32_t moves = SweepList::moves(phase.sweep);
+      orientation_a = d.orientation_cells[body_at[inner.a]].load(moves);
+      orientation_b = d.orientation_cells[body_at[inner.b]].load(moves);
+      context.orientations = {&orientation_a, &orientation_b};
+    }
+    Real restitution = 0;
+    if constexpr (kIsSphere) restitution = row.restitution;
+    operation.template run<false>(&row, context);
+    const auto write = [&](std::uint32_t i, const SolverBody& body, const Vec3& shift,
+                           const soft_step::FreeMotion& change) {
+      motion.store_velocities(i, body);
+      if constexpr (Operation::kMovesBodies) {
+        const bool moves = !(body.shift == shift);
+        if (!moves && !Row::kReadsRotation && !impact.is_pending) return;
+        typename Motion::State state = motion.state(i);
+        if (moves) {
+          motion.store_shift(i, body);
+          state.shift_changed = true;
+        }
+        if constexpr (Row::kReadsRotation) {
+          motion.store_rotation(i, body);
+          state.rotation_changed = true;
+        }
+        if (impact.is_pending) {
+          const BodyCells cells = d.cells(body_at[i]);
+          soft_step::FreeMotion free = cells.read_free(state.version);
+          free.add(change.velocity, change.angular_velocity);
+          cells.write_free(free, &state.version);
+        }
+        motion.set_state(i, state);
+      }
+    };
+    write(inner.a, a, shift_a, impact.of_a);
+    write(inner.b, b, shift_b, impact.of_b);
+    if constexpr (Operation::kChangesRow) {
+      inner.put_into(&row);
+      if constexpr (kIsSphere) {
+        this->store_sphere_row(row, restitution, r);
+      } else {
+        store_changes(row, &d.rows<Row>()[r]);
+      }
+      if (phase.sweeps.stores_impulses(phase.sweep)) {
+        const soft_step::RowSetup setup = d.row_setup();
+        if constexpr (kIsSphere) {
+          setup.store(row, nullptr, inner.contact, 1);  // both bodies are movable
+        } else {
+          row.a = setup.key(inner.contact).a;
+          setup.store(row, d.parts_of(row), inner.contact);
+        }
+      }
+    }
+  }
+
+  /// Makes the motion of a body visible to crossing rows and to the next phase.
+  JFPX_HD void publish(const BlockPhase& phase, const Motion& motion, std::uint32_t i,
+                       std::uint32_t place) const {
+    const StepData& d = data;
+    const std::uint32_t body = d.body_at[place];
+    if (body == kNone) return;
+    const RowBody constants = d.row_bodies[body];
+    if (!(constants.inverse_mass > 0)) return;
+    const BodyCells cells = d.cells(body);
+    const SolverBody state = motion.load(i);
+    typename Motion::State versions = motion.state(i);
+    if (versions.shift_changed) cells.write_shift(state, &versions.version);
+    if (versions.rotation_changed) cells.write_rotation(state, &versions.version);
+    cells.write(phase.ticket_after(), state, versions.version);
+    motion.set_state(i, {versions.version});
+  }
+
+  /// Completes the sweep before, and puts the motion of the body into shared memory.
+  /// @param place of the body in its block
+  JFPX_HD void complete_body(const Sweep& before, const BlockPhase& phase, const Motion& motion,
+                             std::uint32_t place, std::uint32_t i) const {
+    const StepData& d = data;
+    const RowBody constants = d.row_bodies[i];
+    if (!(constants.inverse_mass > 0)) return;
+    ItemBody item;
+    item.start(i, constants);
+    typename Motion::State state;
+    item.before = phase.ticket_before(constants.colors);
+    item.template read<Motion::kHasRotation>(d);
+    const std::uint32_t first_fixed = d.first_fixed[i];
+    SolverBody& body = item.motion;
+    const BodyCells cells = d.cells(i);
+    BodyFree free;
+    visit_operation(phase.fixed_sweep(), [&](const auto& operation) {
+      const Vec3 shift = body.shift;
+      for (std::uint32_t r = first_fixed; r != kNone; r = d.next_fixed[r]) {
+        this->solve_fixed(before, operation, r, &item, &free);
+        if constexpr (Motion::kHasRotation) state.rotation_changed = true;
+      }
+      if (!(body.shift == shift)) state.shift_changed = true;
+    });
+    switch (phase.stage()) {
+      case BodyStage::none:
+        break;
+      case BodyStage::finish:
+        d.step.solver[i] = body;
+        this->check_state(i);
+        return;
+      case BodyStage::move:
+        d.step.move(i, &body);
+        state.shift_changed = state.rotation_changed = true;
+        if constexpr (kKinds > soft_step::kContactRowKinds) {
+          if (d.is_joined(i)) {
+            d.orientation_cells[i].store(d.step.orientation[i], SweepList::moves(phase.sweep));
+          }
+        }
+        break;
+      case BodyStage::accelerate: {
+        const Vec3 shift = body.shift;
+        free.read(cells, item.version);
+        d.step.accelerate(i, &body, &free.motion, false);
+        free.is_changed = true;
+        if (!(body.shift == shift)) state.shift_changed = true;
+        break;
+      }
+    }
+    if (free.is_changed) cells.write_free(free.motion, &item.version);
+    state.version = item.version;
+    if constexpr (!Motion::kHasRotation) state.rotation_changed = false;
+    motion.store_velocities(place, body);
+    motion.store_shift(place, body);
+    motion.store_rotation(place, body);
+    motion.set_state(place, state);
+  }
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx
