@@ -57,8 +57,7 @@ struct BlockPhase {
 /// There is no deadlock: the items of a thread have the order of the colors, and each waits only
 /// for earlier ones in this order, so the first incomplete item is always ready.
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program with
-/// fewer
-///   kinds needs fewer registers and less shared memory
+///   fewer kinds needs fewer registers and less shared memory
 template <soft_step::RowKind kKinds>
 struct BlockSolveProgram : RowSolver<kKinds> {
   using Motion = BlockMotion<kKinds>;

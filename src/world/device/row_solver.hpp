@@ -18,8 +18,7 @@ namespace device {
 /// motion of their bodies through BodyCells: a row waits only for the earlier rows of its two
 /// bodies (see Tickets).
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program with
-/// fewer
-///   kinds needs fewer registers
+///   fewer kinds needs fewer registers
 template <soft_step::RowKind kKinds>
 struct RowSolver {
   using SolverBody = soft_step::SolverBody;

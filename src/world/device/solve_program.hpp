@@ -9,13 +9,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Sweeps over all rows of a world that is not divided into blocks, as soft_step::SoftStepSolver,
-/// without barriers: a row waits only for the
-/// earlier rows of its two bodies (see Tickets), so that consecutive colors and sweeps overlap.
-/// After the rows of a sweep, each body solves its rows with fixed bodies and completes its part of
-/// the substep. Threads exchange only the motion of bodies: Team::run_dataflow() assigns a row to
-/// the same thread in all sweeps, and all other arrays by body are constant or written only by the
-/// thread of the body.
+/// Sweeps over all rows of a world that is one block, as soft_step::SoftStepSolver, without
+/// barriers: a row waits only for the earlier rows of its two bodies (see Tickets), so that
+/// consecutive colors and sweeps overlap. After the rows of a sweep, each body solves its rows with
+/// fixed bodies and completes its part of the substep. Threads exchange only the motion of bodies:
+/// Team::run_dataflow() assigns a row to the same thread in all sweeps, and all other arrays by
+/// body are constant or written only by the thread of the body.
 ///
 /// There is no deadlock. The items of a thread have the order of the sweeps, and an item waits only
 /// for earlier items in this order, so the first incomplete item is always ready.
