@@ -27,7 +27,7 @@ void World::Impl::write(BinaryWriter* writer) {
 }
 
 SnapshotParts World::Impl::snapshot_parts() const {
-  if (store.has_places()) return SnapshotParts::joints_and_places;
+  if (store.has_blocks() || store.has_places()) return SnapshotParts::joints_and_places;
   return joints.capacity() > 0 ? SnapshotParts::joints : SnapshotParts::none;
 }
 

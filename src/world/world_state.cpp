@@ -48,12 +48,12 @@ std::vector<BodyState> World::states() const {
 }
 
 void World::states(std::vector<BodyState>* states) const {
-  constexpr std::size_t kBodiesPerTask = 4096;
+  constexpr std::size_t kStatesPerTask = 4096;
   const BodyStore& store = impl_->bodies_with_states();
   const std::span<const BodyId> ids = bodies();
   states->resize(ids.size());
   const std::lock_guard lock(impl_->fetching);  // the pool runs one loop at a time
-  parallel_for(impl_->pool.get(), ids.size(), kBodiesPerTask,
+  parallel_for(impl_->pool.get(), ids.size(), kStatesPerTask,
                [&](std::size_t first, std::size_t last) {
                  for (std::size_t i = first; i < last; ++i) {
                    (*states)[i] = store.state(ids[i].index);

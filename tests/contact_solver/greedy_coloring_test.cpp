@@ -17,8 +17,9 @@ namespace {
 using namespace soft_step;  // NOLINT: the namespace under test
 
 TEST(GreedyColoring, TakesTheLowestFreeColorOfAClass) {
+  EXPECT_EQ(kOverflowColor, 64);  // as in snapshots of 0.2
   for (const bool is_inner : {true, false}) {
-    const unsigned first = is_inner ? 0 : kColorsPerClass;
+    const unsigned first = is_inner ? 0 : kFirstCrossingColor;
     UsedColors a, b, full;
     EXPECT_EQ(take_lowest_color(is_inner, &a, &b), first);
     EXPECT_EQ(take_lowest_color(is_inner, &a, &b), first + 1);
@@ -44,11 +45,11 @@ std::vector<std::uint8_t> colored_one_by_one(const std::vector<ContactKey>& keys
   std::iota(order.begin(), order.end(), 0u);
   std::ranges::sort(order, {},
                     [&](std::uint32_t i) { return std::tuple(color_order(keys[i]), i); });
-  std::vector<std::vector<bool>> used(bodies, std::vector<bool>(kColors + 1, false));
+  std::vector<std::vector<bool>> used(bodies, std::vector<bool>(256, false));
   std::vector<std::uint8_t> colors(keys.size());
   for (const std::uint32_t i : order) {
     const bool is_inner = keys[i].a < block && keys[i].b < block;
-    std::uint8_t color = is_inner ? 0 : kColorsPerClass;
+    std::uint8_t color = is_inner ? 0 : kFirstCrossingColor;
     const std::uint8_t end = color + kColorsPerClass;
     while (color < end && (used[keys[i].a][color] || used[keys[i].b][color])) ++color;
     colors[i] = color < end ? color : kOverflowColor;

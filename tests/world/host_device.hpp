@@ -27,6 +27,10 @@ class HostTeam {
   void sync() const {}
   const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
 
+  struct alignas(64) SharedPiece {
+    SharedPiece() { std::ranges::fill(numbers, std::nan("")); }  // like uninitialized memory
+    double numbers[8];
+  };
   /// Calls f(block, threads) for all blocks < n.
   template <class F>
   void for_blocks(std::uint32_t n, const F& f) const {
@@ -38,11 +42,11 @@ class HostTeam {
   /// The threads of a block.
   struct Threads {
     const HostTeam& team;
-    std::vector<double>* memory;
+    std::vector<SharedPiece>* memory;
 
     void sync() const {}
     void* shared(std::size_t bytes) const {
-      memory->resize((bytes + sizeof(double) - 1) / sizeof(double), std::nan(""));
+      memory->resize((bytes + sizeof(SharedPiece) - 1) / sizeof(SharedPiece), SharedPiece());
       return memory->data();
     }
     template <class F>
@@ -142,7 +146,7 @@ class HostTeam {
 
  private:
   mutable std::uint64_t loops_ = 0;
-  mutable std::vector<double> memory_;  ///< shared by the threads of a block
+  mutable std::vector<SharedPiece> memory_;  ///< shared by the threads of a block
 };
 
 class HostDevice {

@@ -21,8 +21,8 @@ inline constexpr std::uint32_t kMostBodiesInOneBlock = 1u << 19;
 /// memory of GPUs and the caches of processor cores.
 inline constexpr std::uint32_t kBodiesPerBlock = 1024;
 
-/// Place of a body without a block: an immovable or kinematic body, or a body that was added after
-/// the partition was renewed.
+/// Place of a body without a block: an immovable or kinematic body, a body that was added after the
+/// partition was renewed, or any body of a world that never had several blocks.
 inline constexpr std::uint32_t kNoPlace = 0xffffffffu;
 
 /// Block of a place.

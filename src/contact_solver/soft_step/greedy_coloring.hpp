@@ -18,10 +18,11 @@ namespace soft_step {
 
 /// Number of colors of a class. The classes are inner rows and crossing rows (see blocks.hpp).
 inline constexpr std::uint8_t kColorsPerClass = 64;
-/// Number of colors: first those of inner rows, then those of crossing rows. Contacts without a
-/// free color get kOverflowColor and are solved serially.
-inline constexpr std::uint8_t kColors = 2 * kColorsPerClass;
-inline constexpr std::uint8_t kOverflowColor = kColors;
+/// Colors of inner rows are the numbers below kColorsPerClass. Those of crossing rows start here,
+/// so that the colors of worlds without crossing rows are those of earlier versions in snapshots.
+inline constexpr std::uint8_t kFirstCrossingColor = 128;
+/// Color of contacts without a free color, which are solved serially.
+inline constexpr std::uint8_t kOverflowColor = kColorsPerClass;
 /// Color of a contact with an immovable or kinematic body, which needs no color.
 inline constexpr std::uint8_t kFixedColor = 254;
 /// Color of a contact that has not been colored.
@@ -41,10 +42,16 @@ JFPX_HD constexpr std::uint64_t color_order(const ContactKey& key) {
   return mixed(mixed(bodies + 0x9e3779b97f4a7c15u) ^ parts);
 }
 
-/// Whether a color below kColors is one of inner rows.
+/// Whether a color is one of inner rows.
 JFPX_HD constexpr bool is_inner_color(std::uint32_t color) { return color < kColorsPerClass; }
-/// Number of a color below kColors in its class.
+/// Whether a color is one of inner or crossing rows.
+JFPX_HD constexpr bool is_color(std::uint32_t color) {
+  return is_inner_color(color) ||
+         (color >= kFirstCrossingColor && color < kFirstCrossingColor + kColorsPerClass);
+}
+/// Number in its class of a color for which is_color() holds.
 JFPX_HD constexpr std::uint32_t number_in_class(std::uint32_t color) {
+  static_assert(kFirstCrossingColor % kColorsPerClass == 0);
   return color % kColorsPerClass;
 }
 
@@ -73,12 +80,12 @@ JFPX_HD inline std::uint8_t take_lowest_color(bool is_inner, UsedColors* of_a, U
   if (number == kColorsPerClass) return kOverflowColor;
   a |= std::uint64_t{1} << number;
   b |= std::uint64_t{1} << number;
-  return static_cast<std::uint8_t>(is_inner ? number : kColorsPerClass + number);
+  return static_cast<std::uint8_t>(is_inner ? number : kFirstCrossingColor + number);
 }
 
 /// Whether a contact keeps the color of the last step: it has one, and it is of the same class.
 JFPX_HD constexpr bool keeps_color(std::uint32_t color, bool is_inner) {
-  return color < kColors && is_inner_color(color) == is_inner;
+  return is_color(color) && is_inner_color(color) == is_inner;
 }
 
 /// Assigns to each new contact the lowest color of its class that neither body has, in the order of

@@ -65,7 +65,8 @@ JFPX_HD constexpr decltype(auto) visit_row(RowKind kind, const F& f) {
 
 /// Groups of rows, which a sweep solves one after the other: rows without a color, inner rows, the
 /// crossing rows of each color, and rows with an immovable or kinematic body or with the world.
-/// Inner rows have no group here, because each block has its own rows.
+/// Inner rows have no group here, because each block has its own rows; those of a world of one
+/// block are in the groups of crossing rows.
 inline constexpr std::uint32_t kGroups = kColorsPerClass + 2u;
 inline constexpr std::uint32_t kOverflowGroup = 0, kFixedGroup = kGroups - 1;
 /// Group of a crossing row. @param number of its color in the class

@@ -89,7 +89,7 @@ struct RowSetup {
     return (a & b & BodyTraits::kIsRound) != 0 ? kKindOf<SphereRow> : kKindOf<ManifoldRow>;
   }
 
-  /// The color of a contact or joint: below kColors, kOverflowColor or kFixedColor.
+  /// The color of a contact or joint: that of a row, kOverflowColor or kFixedColor.
   JFPX_HD std::uint32_t color_of(std::uint32_t i) const {
     return is_joint(i) ? joints.now[joint_of(i)].color : contacts.colors[i];
   }

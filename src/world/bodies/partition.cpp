@@ -5,7 +5,6 @@
 #include "src/base/reserve.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <span>
 
 namespace jfpx {
@@ -20,7 +19,7 @@ void Partition::reserve(const BodyStore& bodies) {
   if (bodies.has_blocks()) reserve_geometric(&entries_, bodies.movable_count());
 }
 
-/// Sorts runs in parallel, and merges them in place.
+/// Sorts runs in parallel, and merges them in place, with temporary memory if there is some.
 void Partition::sort(ThreadPool* pool) noexcept {
   const std::size_t count = entries_.size();
   const auto at = [this](std::size_t i) {

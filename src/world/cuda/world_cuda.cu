@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <string>
 #include <tuple>
 #include <utility>
 
@@ -212,6 +213,9 @@ class CudaDevice {
     bool has_clusters = false;
   };
 
+  /// At least the static shared memory of a program.
+  static constexpr std::size_t kStaticShared = 4096;
+
   /// Bytes of shared memory of a block.
   template <class Program>
   static constexpr std::size_t shared_bytes() {
@@ -226,6 +230,15 @@ class CudaDevice {
     if (limits.most_blocks > 0) return limits;
     int resident = 0;
     constexpr std::size_t kShared = shared_bytes<Program>();
+    int most_shared = 0;
+    JFPX_CUDA_TRY(
+        cudaDeviceGetAttribute(&most_shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device_));
+    if (kShared + kStaticShared > static_cast<std::size_t>(most_shared)) {
+      throw DeviceError(
+          "a world with more than " + std::to_string(soft_step::kMostBodiesInOneBlock) +
+          " movable bodies needs " + std::to_string(kShared + kStaticShared) +
+          " bytes of shared memory for a block; this GPU has " + std::to_string(most_shared));
+    }
     JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
                                        cudaFuncAttributeMaxDynamicSharedMemorySize,
                                        static_cast<int>(kShared)));

@@ -89,13 +89,8 @@ class DeviceStep final : public DeviceWorld {
   }
 
   void upload_joints(JointStore* joints) override {
-    const bool had_joints = data_.world_joints.count > 0;
     joints_.upload(transfer_, joints->view(), 1 - now(), room_, &data_);
-    // Steps that are captured must not load a program.
-    if (!had_joints && data_.world_joints.count > 0) {
-      device_->template load<SolveProgram<soft_step::kRowKinds>>();
-      device_->template load<BlockSolveProgram<soft_step::kRowKinds>>();
-    }
+    load_solver();
     is_ready_ = false;
     ++changes_;
   }
@@ -143,6 +138,7 @@ class DeviceStep final : public DeviceWorld {
     to.capacity = from.capacity;
     to.movable_count = from.movable_count;
     to.has_blocks = from.has_blocks;
+    load_solver();
     to.filters_in_use = from.filters_in_use;
     if (sets_pairs) bodies_.update_pairs(transfer_, from, &to);
     const Contacts& last = last_contacts();
@@ -283,6 +279,22 @@ class DeviceStep final : public DeviceWorld {
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
 
+  /// Loads the programs of the solver for the world as it is now, because steps that are captured
+  /// must not load a program.
+  void load_solver() {
+    if (!has_stepped_) return;  // capture() requires a step
+    const bool has_joints = data_.world_joints.count > 0;
+    if (!data_.step.bodies.has_blocks) {
+      has_joints ? device_->template load<SolveProgram<soft_step::kRowKinds>>()
+                 : device_->template load<SolveProgram<soft_step::kContactRowKinds>>();
+    } else if (has_joints) {
+      device_->template load<BlockSolveProgram<soft_step::kRowKinds>>();
+    } else {
+      device_->template load<BlockSolveProgram<kSphereRowKinds>>();
+      device_->template load<BlockSolveProgram<soft_step::kContactRowKinds>>();
+    }
+  }
+
   SubShapes& current_sub_shapes() { return sub_shapes_[sub_shapes_now_]; }
   void use_sub_shapes() {
     data_.swept_bounds.sub_shapes = current_sub_shapes().view();
@@ -353,7 +365,8 @@ class DeviceStep final : public DeviceWorld {
     bodies.torque = torque_sum_;
   }
 
-  /// Whether prepare() has no work. Only forces depend on the step number.
+  /// Whether prepare() has no work. Forces depend on the step number, and so does the renewal of
+  /// the partition, but only while a body is awake: no step is skipped then.
   bool is_prepared(const ForceTable* forces, std::uint64_t steps) const {
     return is_ready_ && !is_held() &&
            (forces == nullptr || (offset(steps) == sent_.offset && forces_.has(*forces)));

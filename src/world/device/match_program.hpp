@@ -124,7 +124,7 @@ struct MatchProgram {
            soft_step::is_inner(true, bodies.place[key.a], bodies.place[key.b]);
   }
 
-  /// Adds a color below kColors to the colors of two bodies.
+  /// Adds a color of inner or crossing rows to the colors of two bodies.
   JFPX_HD void keep(const soft_step::ContactKey& key, std::uint32_t color) const {
     const bool is_inner = soft_step::is_inner_color(color);
     const std::uint64_t bit = std::uint64_t{1} << soft_step::number_in_class(color);

@@ -33,7 +33,10 @@ struct PrepareProgram {
     team.for_each(bodies.count, [&](std::uint32_t i) { start(bodies.ids[i].index); });
     place_rows(team);
     place_points(team);
-    if (bodies.has_blocks) place_inner_rows(team);
+    if (bodies.has_blocks) {
+      place_inner_rows(team);
+      team.sync();  // has_room() reads the numbers of rows of all blocks
+    }
     if (!has_room(team)) return;
     sort_overflow(team);
     team.for_each_nowait(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
@@ -121,7 +124,9 @@ struct PrepareProgram {
     team.for_blocks(data.placed_blocks(), [&](std::uint32_t block, const auto& threads) {
       auto* rows = static_cast<BlockRows*>(threads.shared(kSharedBytes));
       constexpr std::uint32_t kCells = soft_step::kRowKinds * soft_step::kColorsPerClass;
-      threads.for_each(kCells, [&](std::uint32_t i) { rows->next[0][i] = 0; });
+      threads.for_each(kCells, [&](std::uint32_t i) {
+        rows->next[i / soft_step::kColorsPerClass][i % soft_step::kColorsPerClass] = 0;
+      });
       threads.once([&] { rows->points = 0; });
       threads.sync();
       for_inner_contacts(threads, setup, block,

@@ -86,7 +86,7 @@ class ScratchBuffers {
     StepData& d = *data;
     // The places of all slots, and as many bodies without a place, from the next block on.
     d.body_at = transfer.room(&body_at_, 2 * n + kBodiesPerBlock);
-    const std::size_t blocks = 2 * (n / kBodiesPerBlock + 1);
+    const std::size_t blocks = n / kBodiesPerBlock + 1;
     constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
     d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds);
     d.first_inner_joint = transfer.room(&first_inner_joint_, blocks);

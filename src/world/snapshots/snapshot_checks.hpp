@@ -44,7 +44,7 @@ class SnapshotColors {
   /// @throws InvalidSnapshot
   void add(const BodyStore& bodies, std::uint32_t a, std::uint32_t b, std::uint32_t color,
            const Messages& messages) {
-    if (color >= soft_step::kColors) return;
+    if (!soft_step::is_color(color)) return;
     BinaryReader::require(b != soft_step::kWorld && bodies.movable(a) && bodies.movable(b),
                           messages.immovable);
     const bool is_inner = soft_step::is_inner_color(color);

@@ -54,8 +54,6 @@ class RowTable {
   std::uint32_t end(std::size_t cell) const { return begin_[cell + 1]; }
   /// Number of rows of all kinds of cells.
   std::uint32_t size() const { return begin_.empty() ? 0 : begin_.back(); }
-  std::uint32_t overflow_rows() const { return end(overflow()) - begin(overflow()); }
-  const Shape& shape() const { return shape_; }
 
  private:
   Shape shape_;

@@ -13,7 +13,6 @@
 #include <numeric>
 #include <tuple>
 #include <type_traits>
-#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -82,7 +81,7 @@ void SoftStepSolver::inspect_contacts() {
       kinds_[i] = setup_.kind_of(i);
       if (kinds_[i] == kNoRow) continue;
       const std::uint32_t color = setup_.color_of(i);
-      if (color >= kColors) {
+      if (!is_color(color)) {
         if (listed_count == listed.size()) flush();
         listed[listed_count++] = {setup_.movable_body(setup_.key(i)), i, 0, kinds_[i]};
         continue;
@@ -129,7 +128,7 @@ void SoftStepSolver::list_joints() {
   joints_.clear();
   const std::uint32_t first = setup_.contacts.size();
   for (std::uint32_t i = first; i < setup_.size(); ++i) {
-    if (kinds_[i] == kNoRow || setup_.color_of(i) >= kColors) continue;
+    if (kinds_[i] == kNoRow || !is_color(setup_.color_of(i))) continue;
     joints_.push_back({blocks_.block(setup_.key(i).a), i});
   }
   std::ranges::sort(joints_);
@@ -183,7 +182,7 @@ void SoftStepSolver::for_contacts(std::size_t part, const F& f) const {
   const auto visit = [&](std::uint32_t contact) {
     if (kinds_[contact] == kNoRow) return;
     const std::uint32_t color = setup_.color_of(contact);
-    if (color < kColors) f(contact, color);
+    if (is_color(color)) f(contact, color);
   };
   if (!has_blocks_) {
     const std::size_t first = part * kContactsPerPart;

@@ -147,7 +147,7 @@ class SoftStepSolver {
                                      fixed_begin_[part + 1] - fixed_begin_[part]);
   }
 
-  /// Whether the rows of a color below kColors belong to a block.
+  /// Whether the rows of a color belong to a block.
   bool is_of_block(std::uint32_t color) const { return has_blocks_ && is_inner_color(color); }
   template <class F>
   void with_operation(Sweep sweep, const F& f);
