@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <type_traits>
 
 namespace jfpx {
@@ -29,19 +30,12 @@ JFPX_HD inline void atomic_add(std::uint64_t* at, std::uint64_t value) {
 
 #if !defined(__CUDA_ARCH__)
 namespace detail {
-template <class T>
-void atomic_min_on_host(T* at, T value) {
+/// Replaces an item by a value that precedes it.
+template <class T, class Precedes>
+void replace_on_host(T* at, T value, const Precedes& precedes) {
   const std::atomic_ref shared(*at);
   T before = shared.load(std::memory_order_relaxed);
-  while (value < before &&
-         !shared.compare_exchange_weak(before, value, std::memory_order_relaxed)) {
-  }
-}
-template <class T>
-void atomic_max_on_host(T* at, T value) {
-  const std::atomic_ref shared(*at);
-  T before = shared.load(std::memory_order_relaxed);
-  while (before < value &&
+  while (precedes(value, before) &&
          !shared.compare_exchange_weak(before, value, std::memory_order_relaxed)) {
   }
 }
@@ -52,7 +46,7 @@ JFPX_HD inline void atomic_min(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
   atomicMin(at, value);
 #else
-  detail::atomic_min_on_host(at, value);
+  detail::replace_on_host(at, value, std::less<>());
 #endif
 }
 
@@ -60,7 +54,7 @@ JFPX_HD inline void atomic_min(std::uint64_t* at, std::uint64_t value) {
 #if defined(__CUDA_ARCH__)
   atomicMin(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
 #else
-  detail::atomic_min_on_host(at, value);
+  detail::replace_on_host(at, value, std::less<>());
 #endif
 }
 
@@ -68,7 +62,7 @@ JFPX_HD inline void atomic_max(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
   atomicMax(at, value);
 #else
-  detail::atomic_max_on_host(at, value);
+  detail::replace_on_host(at, value, std::greater<>());
 #endif
 }
 
@@ -76,7 +70,7 @@ JFPX_HD inline void atomic_max(std::uint64_t* at, std::uint64_t value) {
 #if defined(__CUDA_ARCH__)
   atomicMax(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
 #else
-  detail::atomic_max_on_host(at, value);
+  detail::replace_on_host(at, value, std::greater<>());
 #endif
 }
 

@@ -22,8 +22,9 @@ void World::Impl::write(BinaryWriter* writer) {
   (*writer)(list.contacts, std::uint64_t{list.detected}, contacts.shows_list);
   write_forces(writer, forces);
   write_generators(writer, generators);
-  if (snapshot_parts() >= SnapshotParts::joints) write_joints(writer, joints);
-  if (snapshot_parts() == SnapshotParts::joints_and_places) store.write_places(writer);
+  const SnapshotParts parts = snapshot_parts();
+  if (parts >= SnapshotParts::joints) write_joints(writer, joints);
+  if (parts == SnapshotParts::joints_and_places) store.write_places(writer);
 }
 
 SnapshotParts World::Impl::snapshot_parts() const {

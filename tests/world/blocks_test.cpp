@@ -186,14 +186,8 @@ TEST(Blocks, AWorldThatGrowsAndShrinksCrossesTheLimit) {
 // As Heaps.AHeapComesToRestWithSmallPenetrationsAndSleeps, for the other order of rows.
 TEST(Blocks, AHeapComesToRestWithSmallPenetrationsAndSleeps) {
   const test::SeveralBlocks several(100);
-  constexpr double kSmallestRadius = 0.45;
   World world(scenes::make("heap", {.spheres = 2500}));
-  test::run(&world, 10);
-  const test::Penetration depth = test::penetration(world);
-  EXPECT_LE(depth.mean, 0.01 * kSmallestRadius);
-  EXPECT_LE(depth.largest, 0.06 * kSmallestRadius);
-  EXPECT_LE(test::speeds(world).rms, 0.002);
-  EXPECT_LT(test::time_to_sleep(&world, 15), 15);
+  test::expect_heap_comes_to_rest(&world);
 }
 
 TEST(Blocks, SnapshotsWithInvalidPlacesAreRefused) {

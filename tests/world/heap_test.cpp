@@ -8,14 +8,8 @@ namespace jfpx {
 namespace {
 
 TEST(Heaps, AHeapComesToRestWithSmallPenetrationsAndSleeps) {
-  constexpr double kSmallestRadius = 0.45;
   World world(scenes::make("heap", {.spheres = 2048}));
-  test::run(&world, 10);
-  const test::Penetration depth = test::penetration(world);
-  EXPECT_LE(depth.mean, 0.01 * kSmallestRadius);
-  EXPECT_LE(depth.largest, 0.06 * kSmallestRadius);
-  EXPECT_LE(test::speeds(world).rms, 0.002);
-  EXPECT_LT(test::time_to_sleep(&world, 15), 15);
+  test::expect_heap_comes_to_rest(&world);
 }
 
 // Otherwise a ball that keeps touching a heap, however slowly, would keep it awake for ever.

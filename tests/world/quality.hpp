@@ -6,6 +6,8 @@
 #include "src/scenes/scenes.hpp"
 #include "tests/world/support.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -85,6 +87,18 @@ inline Speeds speeds(const World& world) {
   }
   result.rms = std::sqrt(squares / count);
   return result;
+}
+
+/// Runs the scene `heap`: penetrations and speeds are small after 10 s, and all bodies sleep
+/// after 15.
+inline void expect_heap_comes_to_rest(World* world) {
+  constexpr double kSmallestRadius = 0.45;
+  run(world, 10);
+  const Penetration depth = penetration(*world);
+  EXPECT_LE(depth.mean, 0.01 * kSmallestRadius);
+  EXPECT_LE(depth.largest, 0.06 * kSmallestRadius);
+  EXPECT_LE(speeds(*world).rms, 0.002);
+  EXPECT_LT(time_to_sleep(world, 15), 15);
 }
 
 }  // namespace test

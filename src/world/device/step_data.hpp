@@ -200,7 +200,7 @@ struct StepData {
   soft_step::DistanceRow* distance_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
-  /// Inner rows by block, kind and color, as numbers of inner_row(); see inner_begin().
+  /// By block, kind and color: the first inner row, as a number in its kind; see inner_begin().
   std::uint32_t* inner_rows = nullptr;
   std::uint32_t* inner_contacts[soft_step::kRowKinds] = {};  ///< by kind and inner row
   std::uint32_t* first_inner_joint = nullptr;  ///< by block: list of the joints of inner rows

@@ -125,7 +125,8 @@ class SoftStepSolver {
 
   void inspect_contacts();
   template <class Contact>
-  void find_ranges(const Contact* contacts, std::uint32_t count, std::vector<std::uint32_t>* first);
+  void find_ranges(const Contact* contacts, std::uint32_t count,
+                   std::vector<std::uint32_t>* ranges);
   void list_joints();
   void group_fixed();
   void count_rows(std::size_t part);
