@@ -66,9 +66,10 @@ struct ResolverSettings {
 /// motion of each body (thesis 4.4.2).
 struct SleepSettings {
   bool enabled = true;
-  /// [m/s], >= 0; soft_step. Limit of the velocity, and of the angular velocity times the bounding
-  /// radius. For spheres, 4 % of the latter count, because nothing brakes a sphere that spins in
-  /// place. The limit is divided by 25 for a body on which a force or torque acts.
+  /// [m/s], >= 0; soft_step. Limit of the displacement in a step divided by its length, and of the
+  /// rotation times the bounding radius. For spheres, 4 % of the latter count, because nothing
+  /// brakes a sphere that spins in place. The limit is divided by 25 for a body on which a force or
+  /// torque acts.
   Real speed = Real(0.05);
   Real time = Real(0.5);     ///< [s], >= 0; soft_step
   Real epsilon = Real(0.3);  ///< [m^2/s^2], > 0: threshold of the mean motion; worst_first

@@ -34,6 +34,7 @@ struct SolverPoint {
   Vec3 arm_a, arm_b;          ///< [m], world axes, from the centres of mass
   Real distance = 0;          ///< [m]; > 0: a gap
   std::uint32_t feature = 0;  ///< identifies the point within its manifold
+  Real tested_distance = 0;   ///< [m], distance at the last full test of a recyclable contact
 };
 
 /// Contact of two shapes with one normal: solver points at the start of the step, and points where

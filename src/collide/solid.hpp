@@ -66,6 +66,10 @@ void for_each_part(const Shape& shape, const Visit& visit) {
   std::visit(visit_parts, shape);
 }
 
+/// Whether the surface of a solid consists of flat faces. Contacts of two such solids are recycled.
+template <class S>
+inline constexpr bool kIsPolyhedron = false;
+
 /// Whether S is a solid, as opposed to a half-space or a plane.
 template <class S>
 inline constexpr bool kIsSolid = kSolidKind<S> < SolidKinds::kCount;

@@ -12,7 +12,7 @@ list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/sequential_impulse/cuda/row_kernels.cu)
 # Chosen at run time, like the kernels of sphere_collider.
 if(JFPX_PROCESSOR STREQUAL "x86_64")
-  foreach(kernels IN ITEMS sequential_impulse/cpu/row_kernels_avx2 soft_step/cpu/sphere_sweep_avx2)
+  foreach(kernels IN ITEMS sequential_impulse/cpu/row_kernels_avx2 soft_step/cpu/sweeps_avx2)
     list(APPEND JFPX_SOURCES ${CMAKE_CURRENT_LIST_DIR}/${kernels}.cpp)
     set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/${kernels}.cpp
       PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")

@@ -62,8 +62,9 @@ void World::Impl::finish_detection(StepReport* report) {
 void World::Impl::find_contacts(StepReport* report) {
   soft_step::ContactSet& set = soft_step.contacts();
   DetectedContacts& found = contacts.detected;
-  const std::size_t spheres = contact_finder.find_speculative_contacts(
-      store, scene.soft_step.speculative_margin, pool.get(), &set, &found);
+  const std::size_t spheres =
+      contact_finder.find_speculative_contacts(store, scene.soft_step.speculative_margin,
+                                               pool.get(), soft_step.last_contacts(), &set, &found);
   report->sphere_contacts = spheres + found.sphere_count;
   report->contacts = spheres + found.contacts.size();
   copy_array(pool.get(), store.moving.position, &found.position);

@@ -24,10 +24,12 @@ void World::Impl::write(BinaryWriter* writer) {
   write_generators(writer, generators);
   const SnapshotParts parts = snapshot_parts();
   if (parts >= SnapshotParts::joints) write_joints(writer, joints);
-  if (parts == SnapshotParts::joints_and_places) store.write_places(writer);
+  if (parts >= SnapshotParts::joints_and_places) store.write_places(writer);
+  if (parts >= SnapshotParts::recyclable) write_tests(writer, soft_step.last_contacts());
 }
 
 SnapshotParts World::Impl::snapshot_parts() const {
+  if (any_recyclable(soft_step.last_contacts())) return SnapshotParts::recyclable;
   if (store.has_blocks() || store.has_places()) return SnapshotParts::joints_and_places;
   return joints.capacity() > 0 ? SnapshotParts::joints : SnapshotParts::none;
 }
@@ -52,6 +54,7 @@ void World::Impl::read(BinaryReader* reader) {
   JointStore new_joints;
   if (reader->left() > 0) new_joints = read_joints(reader, &colors, &bodies);
   if (reader->left() > 0) bodies.read_places(reader);
+  if (reader->left() > 0) read_tests(reader, &last);
   BinaryReader::require(reader->left() == 0, "it is too long");
   BinaryReader::require(new_joints.empty() || settings.solver == Solver::soft_step,
                         "it has joints, and the solver worst_first");

@@ -45,22 +45,22 @@ constexpr Pin kPins[] = {
 /// With Solver::soft_step.
 constexpr Pin kSoftStepPins[] = {
     {"pile", 100, 100, 0xe20119f80b9573f7u, 0xb7927b6441f83c2fu},
-    {"heap", 100, 400, 0xab25ee1fae624ff9u, 0x11378a4d2f5eab31u},
+    {"heap", 100, 400, 0x1a6d03866b8c7cb0u, 0xb608a422b5a10a10u},
     {"gas", 200, 100, 0xa8788d5639ea9d11u, 0xc2e937f96631d72bu},
     {"columns", 64, 60, 0x9678de459fd6c2dbu, 0x0f973ef94576d375u},
     {"overlap", 32, 60, 0x1aa5330e3d17bbf6u, 0xe54219b9024930d0u},
     {"lattice", 125, 30, 0xc1b4bc0d5892cdceu, 0xfdde9b1863a93df8u},
-    {"polydisperse", 100, 60, 0x347dbd6648aa912du, 0x6334b248a85c88dfu},
-    {"mixed", 40, 150, 0xb2e10c3add6e50ccu, 0x35aa8b3c8aa3ef49u},
-    {"capsules", 20, 200, 0xaea0301d65c48ac6u, 0x42722b4dc86a94f0u},
-    {"bridge", 30, 200, 0xb587bf8eda4231ecu, 0x6014877ef2db3d2cu},
+    {"polydisperse", 100, 60, 0xd62f77d75c6f7d7eu, 0x367a150899394731u},
+    {"mixed", 40, 150, 0x2547f74b439317c8u, 0xa8f326a06f95810cu},
+    {"capsules", 20, 200, 0xcfcabd432b860506u, 0x1ed70d9c23782c32u},
+    {"bridge", 30, 200, 0x0fa9033331da8651u, 0xbab82dbf31cf057fu},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},
 };
 
 /// joint_scene() with Solver::soft_step.
-constexpr Pin kJointPin{"joints", 100, 200, 0x7f8ba1c014a130bbu, 0x28f56fec60674350u};
+constexpr Pin kJointPin{"joints", 100, 200, 0x4d9e3fbd38f985d5u, 0x2b0c0d5a1d7116beu};
 
 struct DemoPin {
   const char* demo;

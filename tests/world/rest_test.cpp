@@ -109,6 +109,26 @@ World sleeping_row() {
   return world;
 }
 
+TEST(SleepInSoftStep, ABodyAtTheTurningPointOfASlowThrowStaysAwake) {
+  BodyDef def = test::ball({0, 5, 0}, 0.5_r);
+  def.acceleration = {0, -0.05_r, 0};
+  def.velocity = {0.02_r, 0.1_r, 0};
+  Scene scene;
+  scene.bodies = {def, test::ground()};
+  World world(scene);
+  Real height = 5;
+  for (int n = 0; n < 3600 && world.step().awake > 0; ++n) height = world.states()[0].position.y;
+  EXPECT_LT(height, 0.51_r);
+}
+
+TEST(SleepInSoftStep, ABodyThatIsPushedOutStaysAwake) {
+  Scene scene;
+  scene.bodies = {heavy({0, -3.5_r, 0}, true, 0.5_r), test::ground()};
+  World world(scene);
+  for (int n = 0; n < 3600 && world.step().awake > 0;) ++n;
+  EXPECT_NEAR(world.states()[0].position.y, 0.5, 1e-2);
+}
+
 TEST_P(Sleep, TouchingBallsFallAsleepTogetherAndKeepTheirContacts) {
   World world = sleeping_row();
   for (std::size_t i = 0; i < 4; ++i) EXPECT_FALSE(world.awake(world.bodies()[i]));

@@ -52,7 +52,9 @@ jfpx_add_test(portable_files_test THESIS SOURCES world/portable_files_test.cpp)
 set_source_files_properties(world/portable_files_test.cpp PROPERTIES
   COMPILE_DEFINITIONS "JFPX_FILES=\"${CMAKE_CURRENT_SOURCE_DIR}/world/files/\"")
 jfpx_add_test(quality_test THESIS SOURCES
+  world/box_rest_test.cpp
   world/equilibrium_test.cpp
+  world/free_rotation_test.cpp
   world/friction_test.cpp
   world/heap_test.cpp
   world/impact_test.cpp

@@ -8,21 +8,33 @@ namespace {
 
 using test::operator""_r;
 
-/// Balls that overlap, slide, rebound and roll in a room.
-Scene random_balls(Random* random) {
+/// Balls and boxes that overlap, slide, rebound and roll in a room.
+Scene random_bodies(Random* random, bool any_boxes) {
   Scene scene;
   scene.soft_step.substeps = 1 + static_cast<std::uint32_t>(random->below(5));
-  const std::uint64_t count = 1 + random->below(300);
+  const std::uint64_t count = 1 + random->below(any_boxes ? 150 : 300);
   const bool rebounds = random->below(2) == 0, rolls = random->below(4) == 0;
   for (std::uint64_t i = 0; i < count; ++i) {
     BodyDef def = test::heavy(random->uniform_in_box({-3, 0, -3}, {3, 8, 3}));
     def.shape = Sphere{random->uniform(0.2_r, 0.9_r)};
+    if (any_boxes && random->below(3) != 0) {
+      def.shape = Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.8_r, 0.8_r, 0.8_r})};
+    }
     def.mass = random->below(30) == 0 ? 0 : random->uniform(0.1_r, 10);
     def.friction = random->below(3) == 0 ? 0 : random->uniform(0, 1);
     if (def.mass > 0) def.velocity = random->uniform_in_box({-6, -6, -6}, {6, 6, 6});
     if (rebounds) def.restitution = random->uniform(0, 1);
     if (rolls && random->below(2) == 0) def.rolling_friction = 0.02_r;
     scene.bodies.push_back(def);
+  }
+  if (any_boxes && random->below(2) == 0) {
+    BodyDef moving = test::heavy({0, 0.5_r, 0});
+    moving.shape = Box{{2, 0.5_r, 2}};
+    moving.mass = 0;
+    moving.kinematic = true;
+    moving.velocity = {0.5_r, 0, 0.2_r};
+    moving.angular_velocity = {0, 1, 0};
+    scene.bodies.push_back(moving);
   }
   scene.bodies.push_back(test::ground());
   for (const Vec3& normal : {Vec3{1, 0, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, 0, -1}}) {
@@ -32,12 +44,12 @@ Scene random_balls(Random* random) {
 }
 
 // The snapshots contain the impulses of contacts.
-TEST(VectorWidths, HaveEqualSnapshotsOfRandomBalls) {
+TEST(VectorWidths, HaveEqualSnapshotsOfRandomBodies) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   for (int k = 0; k < 30; ++k) {
-    const Scene scene = random_balls(&random);
+    const Scene scene = random_bodies(&random, k % 2 == 1);
     World scalar(scene, {.collider = {.backend = Backend::cpu, .simd = SimdLevel::scalar}});
     World vectors(scene, {.collider = {.backend = Backend::cpu, .simd = SimdLevel::automatic}});
     for (int n = 0; n < 25; ++n) {

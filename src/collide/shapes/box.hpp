@@ -10,6 +10,8 @@ namespace detail {
 
 template <>
 inline constexpr const char* kShapeName<Box> = "box";
+template <>
+inline constexpr bool kIsPolyhedron<Box> = true;
 
 JFPX_HD inline Solid to_solid(const Box& box) { return {box.half_extents, 0}; }
 JFPX_HD inline Box from_solid(const Solid& solid, std::type_identity<Box>) {

@@ -3,6 +3,7 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
+#include "src/contact_solver/soft_step/contact_lookup.hpp"
 #include "src/contact_solver/soft_step/contact_match.hpp"
 
 #include <algorithm>
@@ -13,28 +14,6 @@ namespace soft_step {
 namespace {
 
 constexpr std::size_t kMatchesPerChunk = 2048;
-
-/// Finds contacts in a sorted list, for ascending keys.
-template <class Contact>
-class Finder {
- public:
-  /// @param first lower bound of the keys
-  Finder(const std::vector<Contact>& sorted, const ContactKey& first)
-      : next_(std::ranges::lower_bound(sorted, first, {}, &Contact::key)),
-        begin_(sorted.begin()),
-        end_(sorted.end()) {}
-
-  /// @param key not below that of the last call
-  /// @param index receives the index of the contact
-  bool find(const ContactKey& key, std::uint32_t* index) {
-    while (next_ != end_ && next_->key < key) ++next_;
-    *index = static_cast<std::uint32_t>(next_ - begin_);
-    return next_ != end_ && next_->key == key;
-  }
-
- private:
-  typename std::vector<Contact>::const_iterator next_, begin_, end_;
-};
 
 }  // namespace
 
@@ -117,7 +96,7 @@ void ContactCache::keep(std::uint32_t i, bool is_kept, std::uint32_t before,
 void ContactCache::match_spheres(std::uint32_t first, std::uint32_t last,
                                  const MatchedBodies& bodies) {
   GreedyColoring::Portion uncolored(&coloring_);
-  Finder<SphereContactInput> finder(last_.spheres, current_.spheres[first].key);
+  ContactLookup<SphereContactInput> finder(last_.spheres);
   for (std::uint32_t i = first; i < last; ++i) {
     const SphereContactInput& contact = current_.spheres[i];
     current_.impulses[i] = {};
@@ -134,7 +113,7 @@ void ContactCache::match_manifolds(std::uint32_t first, std::uint32_t last,
   GreedyColoring::Portion uncolored(&coloring_);
   const auto spheres = static_cast<std::uint32_t>(current_.spheres.size());
   const auto spheres_before = static_cast<std::uint32_t>(last_.spheres.size());
-  Finder<ManifoldInput> finder(last_.manifolds, current_.manifolds[first].key);
+  ContactLookup<ManifoldInput> finder(last_.manifolds);
   for (std::uint32_t m = first; m < last; ++m) {
     const ManifoldInput& contact = current_.manifolds[m];
     for (std::uint32_t p = 0; p < contact.count; ++p) {

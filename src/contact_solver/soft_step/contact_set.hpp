@@ -32,6 +32,14 @@ struct SphereContactInput {
   Real distance = 0;  ///< [m], along the normal; > 0: a gap
 };
 
+/// Poses of two bodies at the last full test of their shapes; see recycle(). Contacts that are not
+/// recycled have none: all numbers are 0.
+struct TestedPoses {
+  Quat orientation_a{0, 0, 0, 0}, orientation_b{0, 0, 0, 0};
+  Vec3 offset;  ///< [m], position of a minus position of b
+  JFPX_HD bool are_set() const { return !(orientation_a == Quat{0, 0, 0, 0}); }
+};
+
 /// Any other contact, with one normal and one or several points.
 struct ManifoldInput {
   ContactKey key;
@@ -39,6 +47,7 @@ struct ManifoldInput {
   std::uint32_t first = 0, count = 0;  ///< range of points
   /// [-], of a generated contact; for other contacts, combined from those of the bodies
   Real friction = 0, restitution = 0;
+  TestedPoses tested;
 };
 using PointInput = detail::SolverPoint;
 

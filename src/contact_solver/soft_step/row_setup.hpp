@@ -46,6 +46,7 @@ struct RowSetup {
   /// the substeps on the CPU change this array.
   const SolverBody* start = nullptr;
   Real restitution_threshold = 0;  ///< StepConstants::restitution_threshold
+  Real inverse_friction_gap = 0;   ///< StepConstants::inverse_friction_gap
 
   /// Number of contacts and slots of joints.
   JFPX_HD std::uint32_t size() const { return contacts.size() + joints.count; }
@@ -155,9 +156,6 @@ struct RowSetup {
     row->normal = basis.normal;
     row->tangent = basis.tangent;
     row->bitangent = basis.bitangent;
-    const Vec3 rolling =
-        contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
-    row->rolling_impulse = flipped ? -rolling : rolling;
     Real restitution = 0;
     if (key.is_generated()) {
       row->friction = contacts.manifold(contact).friction;
@@ -173,32 +171,44 @@ struct RowSetup {
       restitution = combined(properties.rules.restitution, properties.restitution[row->a],
                              properties.restitution[row->b]);
     }
-    const SolverBody &start_a = start[row->a], &start_b = start[row->b];
+    const bool rolls = row->rolling_friction > 0 || row->spinning_friction > 0;
+    const Vec3 rolling =
+        rolls && contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
+    row->rolling_impulse = flipped ? -rolling : rolling;
+    SolverBody a = start[row->a], b = start[row->b];
+    const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
+                        &properties.inverse_inertia[row->b]};
+    const FrictionPoints from(*this, *row, contact);
+    Vec3 centre_a, centre_b;
+    for (std::uint32_t i = 0; i < row->count; ++i) {
+      const PointArms arms = from.arms(i);
+      const Real share = from.share(i);
+      centre_a += arms.a * share;
+      centre_b += arms.b * share;
+    }
+    Vec3 friction;
+    row->twist_impulse = row->twist_arm = 0;
+    const KeptImpulse* const kept = contacts.impulses + contacts.first_impulse(contact);
     for (std::uint32_t i = 0; i < row->count; ++i) {
       PointRow& p = points[i];
-      p.distance = contacts.distance(contact, i);
-      if (contacts.is_sphere(contact)) {
-        const Real half_overlap = p.distance < 0 ? p.distance * Real(0.5) : Real(0);
-        p.arm_a = -row->normal * (properties.radius[row->a] + half_overlap);
-        p.arm_b = row->normal * (properties.radius[row->b] + half_overlap);
-      } else {
-        const PointInput& point = contacts.points[contacts.manifold(contact).first + i];
-        p.arm_a = flipped ? point.arm_b : point.arm_a;
-        p.arm_b = flipped ? point.arm_a : point.arm_b;
-      }
-      const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact) + i];
-      const Vec3 unflipped = in_tangent_plane(kept.friction, normal);
-      const Vec3 friction = flipped ? -unflipped : unflipped;
-      p.normal_impulse = kept.normal;
-      p.friction_x = dot(friction, row->tangent);
-      p.friction_y = dot(friction, row->bitangent);
-      SolverBody a = start_a, b = start_b;
-      const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
-                          &properties.inverse_inertia[row->b]};
-      set_masses<kFixed>(*row, &p, pair);
-      p.rebound = -rebound_speed(relative_velocity(pair, p.arm_a, p.arm_b), row->normal, p.distance,
+      const PointArms arms = from.arms(i);
+      const Vec3 arm = arms.a - centre_a;
+      const Vec3 of_point = flipped ? -kept[i].friction : kept[i].friction;
+      friction += of_point;
+      row->twist_impulse += dot(cross(arm, of_point), row->normal);
+      row->twist_arm += length(arm) * from.share(i);
+      p.distance = from.distance(i);
+      p.normal_impulse = kept[i].normal;
+      set_lever<kFixed>(pair, arms.a, arms.b, row->normal, &p);
+      p.normal_mass = 1 / (linear_response<kFixed>(pair) + turning(p, p));
+      p.rebound = -rebound_speed(relative_velocity(pair, arms.a, arms.b), row->normal, p.distance,
                                  row->a, row->b, restitution);
     }
+    row->friction_x = dot(friction, row->tangent);
+    row->friction_y = dot(friction, row->bitangent);
+    set_lever<kFixed>(pair, centre_a, centre_b, row->tangent, &row->x);
+    set_lever<kFixed>(pair, centre_a, centre_b, row->bitangent, &row->y);
+    set_friction_masses<kFixed>(row, pair);
   }
 
   template <bool kFixed>
@@ -246,12 +256,22 @@ struct RowSetup {
     if (contacts.rolling_impulses != nullptr) {
       contacts.rolling_impulses[contact] = row.rolling_impulse * side;
     }
-    for (std::uint32_t p = 0; p < row.count; ++p) {
-      const Vec3 friction =
-          row.tangent * points[p].friction_x + row.bitangent * points[p].friction_y;
-      const bool is_released = !(points[p].normal_impulse > 0) && has_pushed(points[p]);
-      contacts.impulses[contacts.first_impulse(contact) + p] = {
-          friction * side, is_released ? KeptImpulse::kReleased : points[p].normal_impulse};
+    // The points share the friction, so that their sum and their torque are those of the row.
+    const FrictionPoints from(*this, row, contact);
+    Vec3 centre;
+    for (std::uint32_t i = 0; i < row.count; ++i) centre += from.arms(i).a * from.share(i);
+    Real spread = 0;
+    for (std::uint32_t i = 0; i < row.count; ++i) {
+      spread += length_squared(from.arms(i).a - centre) * from.share(i);
+    }
+    const Real twist = spread > 0 ? row.twist_impulse / spread : Real(0);
+    const Vec3 friction = row.tangent * row.friction_x + row.bitangent * row.friction_y;
+    KeptImpulse* const kept = contacts.impulses + contacts.first_impulse(contact);
+    for (std::uint32_t i = 0; i < row.count; ++i) {
+      const Vec3 arm = from.arms(i).a - centre;
+      const Vec3 of_point = (friction + cross(row.normal, arm) * twist) * from.share(i);
+      const bool is_released = !(points[i].normal_impulse > 0) && has_pushed(points[i]);
+      kept[i] = {of_point * side, is_released ? KeptImpulse::kReleased : points[i].normal_impulse};
     }
   }
   JFPX_HD void store(const DistanceRow& row, const NoPart*, std::uint32_t i) const {
@@ -260,6 +280,55 @@ struct RowSetup {
   }
 
  private:
+  struct PointArms {
+    Vec3 a, b;  ///< [m], from the centres of mass of the bodies of the row
+  };
+  /// Points of a contact in the row of a manifold, and their weights in its centre of friction.
+  struct FrictionPoints {
+    const PointInput* points;  ///< null for a contact of two spheres
+    bool is_flipped;
+    PointArms of_sphere;
+    Real distance_of_sphere = 0;
+    Real inverse_gap, scale = 1;
+
+    /// @param row its bodies, normal and number of points are set
+    JFPX_HD FrictionPoints(const RowSetup& setup, const ManifoldRow& row, std::uint32_t contact)
+        : points(nullptr),
+          is_flipped(setup.contacts.key(contact).a != row.a),
+          inverse_gap(setup.inverse_friction_gap) {
+      if (setup.contacts.is_sphere(contact)) {
+        distance_of_sphere = setup.contacts.distance(contact, 0);
+        const Real half_overlap = distance_of_sphere < 0 ? distance_of_sphere * Real(0.5) : Real(0);
+        of_sphere = {-row.normal * (setup.properties.radius[row.a] + half_overlap),
+                     row.normal * (setup.properties.radius[row.b] + half_overlap)};
+        return;
+      }
+      points = setup.contacts.points + setup.contacts.manifold(contact).first;
+      Real sum = 0;
+      for (std::uint32_t i = 0; i < row.count; ++i) sum += weight(i);
+      scale = 1 / sum;
+    }
+    JFPX_HD Real distance(std::uint32_t i) const {
+      return points == nullptr ? distance_of_sphere : points[i].distance;
+    }
+    JFPX_HD PointArms arms(std::uint32_t i) const {
+      if (points == nullptr) return of_sphere;
+      const PointInput& point = points[i];
+      if (is_flipped) return {point.arm_b, point.arm_a};
+      return {point.arm_a, point.arm_b};
+    }
+    /// Share of a point, which changes continuously when it opens or closes a gap.
+    JFPX_HD Real share(std::uint32_t i) const {
+      return points == nullptr ? Real(1) : weight(i) * scale;
+    }
+
+   private:
+    JFPX_HD Real weight(std::uint32_t i) const {
+      constexpr Real kLeast = Real(1e-6);
+      const Real weight = 1 - points[i].distance * inverse_gap;
+      return weight > 1 ? Real(1) : weight > kLeast ? weight : kLeast;
+    }
+  };
   /// kind_of() for joints.
   JFPX_HD RowKind joint_kind(std::uint32_t joint) const {
     if (!joints.is_used(joint)) return kNoRow;

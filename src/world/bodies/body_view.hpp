@@ -103,10 +103,18 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
     // noticeably with many substeps.
     const Mat3 axes = to_matrix(orientation_now);
     Vec3 change;
-    if (detail::gyroscopic_change(transform_transpose(axes, *w), tensor[i], substep, &change)) {
+    const Vec3 local = transform_transpose(axes, *w);
+    if (detail::momentum_keeping_change(local, tensor[i], substep, &change)) {
       *w += axes * change;
     }
   }
+};
+
+/// Motion of a body in a step.
+struct StepMotion {
+  Vec3 shift;            ///< [m], of the centre of mass
+  Vec3 rotation;         ///< [rad], to first order
+  Vec3 velocity_change;  ///< [m/s]
 };
 
 /// The arrays of a BodyView that a step of soft_step changes.
@@ -146,15 +154,30 @@ struct MotionPointers : MotionColumns<PointerColumn> {
   /// at the ordinary speed, a damped spring would fall asleep far from its equilibrium. The
   /// rotation of a sphere has a smaller weight, because it leaves the surface in place, and no
   /// friction ends a rotation about the contact normal.
-  JFPX_HD void update_rest_time(const BodyView& bodies, std::uint32_t i, bool is_driven) const {
+  ///
+  /// The speed is that of the displacement, which includes the push-out of penetrations. The
+  /// velocity at the end of the step may contain a part that the next substep cancels before the
+  /// body moves.
+  /// @param motion of the step
+  JFPX_HD void update_rest_time(const BodyView& bodies, std::uint32_t i, bool is_driven,
+                                const StepMotion& motion) const {
     constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.04);
-    const Real limit = is_driven ? bodies.sleep_speed * kDriven : bodies.sleep_speed;
+    const Real limit = (is_driven ? bodies.sleep_speed * kDriven : bodies.sleep_speed) * bodies.dt;
     const Real weight = bodies.radius[i] > 0 ? kRotationOfSphere : Real(1);
-    const Real spin = length(angular_velocity[i]) * bodies.extent[i] * weight;
-    const Real linear = length(velocity[i]);
-    const Real speed = linear < spin ? spin : linear;
-    const bool is_slow = bodies.can_sleep[i] != 0 && speed <= limit;
+    const Real spin = length(motion.rotation) * bodies.extent[i] * weight;
+    const Real linear = length(motion.shift);
+    const Real distance = linear < spin ? spin : linear;
+    const bool is_slow = bodies.can_sleep[i] != 0 && distance <= limit &&
+                         !falls_freely(bodies.acceleration[i] * bodies.dt, motion.velocity_change);
     rest_time[i] = is_slow ? rest_time[i] + bodies.dt : Real(0);
+  }
+
+ private:
+  /// Whether a body falls like one without contacts, although it may be slow.
+  /// @param free [m/s], change of the velocity by the constant acceleration in a step
+  JFPX_HD static bool falls_freely(const Vec3& free, const Vec3& velocity_change) {
+    return !(free == Vec3{}) &&
+           length_squared(velocity_change - free) <= Real(0.25) * length_squared(free);
   }
 };
 

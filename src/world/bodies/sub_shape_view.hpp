@@ -83,6 +83,14 @@ struct SubShapeView {
   JFPX_HD bool is_part(SubShape i) const { return !is_wall(i) && parts[i] != 0; }
   JFPX_HD bool is_sphere(SubShape i) const { return i < ranges.spheres(); }
   JFPX_HD bool is_wall(SubShape i) const { return i >= ranges.bounded(); }
+  JFPX_HD bool is_polyhedron(SubShape i) const {
+    if (is_wall(i)) return false;
+    bool result = false;
+    detail::SolidKinds::visit(SubShapeRanges::kind_of_range(ranges.range_of(i)), [&](auto type) {
+      result = detail::kIsPolyhedron<typename decltype(type)::type>;
+    });
+    return result;
+  }
   JFPX_HD const PosedSolid& solid(SubShape i) const { return solids[i - ranges.spheres()]; }
   JFPX_HD const Wall& wall(SubShape i) const { return walls[i - ranges.bounded()]; }
   /// The sphere itself, or the bounding sphere of another solid.
@@ -155,7 +163,16 @@ JFPX_HD inline void find_contact(const SubShapeView& sub_shapes, SubShapeView::S
 struct Candidate {
   std::uint32_t a = 0, b = 0;  ///< bodies, in the order that Contact defines
   SubShapeView::SubShape sub_shape_a = 0, sub_shape_b = 0;
-  friend auto operator<=>(const Candidate&, const Candidate&) = default;
+  friend bool operator==(const Candidate&, const Candidate&) = default;
+  /// In the order of the members. Two numbers are compared at once, because sorting takes long.
+  friend JFPX_HD std::strong_ordering operator<=>(const Candidate& x, const Candidate& y) {
+    const auto joined = [](std::uint32_t high, std::uint32_t low) {
+      return std::uint64_t{high} << 32 | low;
+    };
+    const std::uint64_t p = joined(x.a, x.b), q = joined(y.a, y.b);
+    if (p != q) return p <=> q;
+    return joined(x.sub_shape_a, x.sub_shape_b) <=> joined(y.sub_shape_a, y.sub_shape_b);
+  }
 };
 
 /// A pair of sub-shapes in the order of their bodies.

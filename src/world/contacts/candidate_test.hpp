@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/world/contacts/recycle.hpp"
 #include "src/world/contacts/swept_bounds.hpp"
 
 #include <cstdint>
@@ -9,25 +10,36 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Result of a candidate test: contact points for the solver if the sub-shapes may touch during the
-/// step, and points of World::contacts() if they touch at its start.
-struct CandidateManifold : detail::PairManifold {
-  soft_step::ContactKey key;
-};
-
 /// Finds the contact of two sub-shapes that may touch during the step. Sensors have no points for
-/// the solver. @param found receives the contact
+/// the solver.
+/// @param last_points points of the contacts of the last step
+/// @param find_last   function that returns the contact of the last step with a key, or null
+/// @param found       receives the contact
+template <class FindLast>
 JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& pair,
-                                   CandidateManifold* found) {
+                                   const soft_step::PointInput* last_points,
+                                   const FindLast& find_last, CandidateManifold* found) {
   const BodyView& bodies = bounds.bodies;
   found->key = {pair.a, pair.b, bounds.sub_shapes.part(pair.sub_shape_a),
                 bounds.sub_shapes.part(pair.sub_shape_b)};
   found->clear();
+  found->tested = {};
+  const bool is_recyclable = bounds.sub_shapes.is_polyhedron(pair.sub_shape_a) &&
+                             bounds.sub_shapes.is_polyhedron(pair.sub_shape_b);
+  if (is_recyclable) {
+    const soft_step::ManifoldInput* last = find_last(found->key);
+    if (last != nullptr && recycle(bounds, pair, *last, last_points, found)) return;
+  }
   const Vec3 motion = bodies.predicted_motion(pair.a) - bodies.predicted_motion(pair.b);
   const Vec3& centre = bodies.position[pair.a];
+  const Real margin = bounds.margin_of(pair);
+  // Farther shapes do not meet. Boxes are then separated by the first axis that shows it. The slack
+  // is more than rounding and the preference for an earlier axis change.
+  const Real limit = (margin + length(motion)) * Real(1.1);
   find_contact(bounds.sub_shapes, pair.sub_shape_a, pair.sub_shape_b, centre,
-               {motion, bounds.margin_of(pair), kMaxReal, centre, bodies.position[pair.b]}, found);
+               {motion, margin, limit, centre, bodies.position[pair.b]}, found);
   if (bodies.sensor[pair.a] != 0 || bodies.sensor[pair.b] != 0) found->point_count = 0;
+  if (is_recyclable && found->point_count > 0) note_test(bodies, found);
 }
 
 }  // namespace JFPX_ABI

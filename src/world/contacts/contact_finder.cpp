@@ -3,6 +3,7 @@
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
+#include "src/contact_solver/soft_step/contact_lookup.hpp"
 #include "src/world/contacts/merge_contacts.hpp"
 
 #include <algorithm>
@@ -33,6 +34,26 @@ struct Refilled {
   }
   void finish() { items->resize(size); }
 };
+
+/// Sorts a list that consists of a few ascending runs.
+/// @param scratch memory that is kept from step to step
+void sort_runs(std::vector<Candidate>* list, std::vector<Candidate>* scratch) {
+  constexpr int kMostRuns = 8;
+  auto middle = std::ranges::is_sorted_until(*list);
+  for (int runs = 1; middle != list->end(); ++runs) {
+    if (runs == kMostRuns) {
+      std::ranges::sort(*list);
+      return;
+    }
+    const auto sorted = static_cast<std::size_t>(middle - list->begin());
+    const auto end = std::is_sorted_until(middle, list->end());
+    resize_geometric(scratch, list->size());
+    auto rest = std::merge(list->begin(), middle, middle, end, scratch->begin());
+    std::copy(end, list->end(), rest);
+    std::swap(*list, *scratch);
+    middle = std::is_sorted_until(list->begin() + static_cast<std::ptrdiff_t>(sorted), list->end());
+  }
+}
 
 /// Appends the lists of all parts to a list.
 /// @param list returns the list of a part
@@ -172,7 +193,7 @@ void ContactFinder::Part::add(const BodyStore& bodies, const CandidateManifold& 
   if (found.point_count == 0) return;
   const auto first = static_cast<std::uint32_t>(points.size());
   points.insert(points.end(), found.points, found.points + found.point_count);
-  manifolds.push_back({found.key, found.normal, first, found.point_count});
+  manifolds.push_back({found.key, found.normal, first, found.point_count, 0, 0, found.tested});
 }
 
 /// Calls find(first, last, part) for the chunks of [0, count) from any thread, then
@@ -200,11 +221,17 @@ void ContactFinder::for_each_batch(ThreadPool* pool, std::size_t count, std::siz
 
 /// Runs the pair tests of a sorted list of candidates and appends the results.
 void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
-                                    Results* results, ThreadPool* pool) {
+                                    const ContactSet& recyclable, Results* results,
+                                    ThreadPool* pool) {
   const auto test_chunk = [&](std::size_t first, std::size_t last, Part* part) {
     CandidateManifold found;
+    soft_step::ContactLookup<soft_step::ManifoldInput> lookup(recyclable.manifolds);
+    const auto find_last = [&](const soft_step::ContactKey& key) {
+      std::uint32_t index = 0;
+      return lookup.find(key, &index) ? &recyclable.manifolds[index] : nullptr;
+    };
     for (const Candidate& pair : candidates.subspan(first, last - first)) {
-      test_candidate(swept_bounds_, pair, &found);
+      test_candidate(swept_bounds_, pair, recyclable.points.data(), find_last, &found);
       part->add(bodies, found);
     }
   };
@@ -225,8 +252,8 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
 }
 
 std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Real margin,
-                                                     ThreadPool* pool, ContactSet* set,
-                                                     DetectedContacts* detected) {
+                                                     ThreadPool* pool, const ContactSet& recyclable,
+                                                     ContactSet* set, DetectedContacts* detected) {
   sub_shapes_.update_poses(bodies, pool);
   sweep_bounds(bodies, margin, pool);
   Results results{{&set->spheres}, {&set->manifolds}, {&set->points}, {&detected->contacts}};
@@ -256,7 +283,7 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
   if (!compounds_.empty()) {
     const std::size_t middle = results.touches.size;
     std::ranges::sort(compounds_);
-    test_candidates(bodies, compounds_, &results, pool);
+    test_candidates(bodies, compounds_, recyclable, &results, pool);
     merge_by_bodies(middle, std::span(detected->contacts).first(results.touches.size), &merged_);
   }
   detected->sphere_count = results.touches.size;
@@ -270,8 +297,8 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
                        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
                  });
   candidates.finish();
-  if (!std::ranges::is_sorted(candidates_)) std::ranges::sort(candidates_);
-  test_candidates(bodies, candidates_, &results, pool);
+  sort_runs(&candidates_, &merged_candidates_);
+  test_candidates(bodies, candidates_, recyclable, &results, pool);
   results.spheres.finish();
   results.manifolds.finish();
   results.points.finish();

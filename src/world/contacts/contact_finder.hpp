@@ -35,11 +35,13 @@ class ContactFinder {
   /// b. Contact defines which body is a. Friction and restitution are 0. The forces of the step
   /// must have been summed before.
   /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
+  /// @param recyclable contacts of the last step
   /// @param set      receives all pairs, each list sorted by key
   /// @param detected receives the contacts with distance <= 0 that are not in set->spheres
   /// @returns the number of contacts in set->spheres with distance <= 0
   /// @throws the exceptions of SphereCollider::find_pairs()
   std::size_t find_speculative_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
+                                        const soft_step::ContactSet& recyclable,
                                         soft_step::ContactSet* set, DetectedContacts* detected);
 
   SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
@@ -86,14 +88,14 @@ class ContactFinder {
                          Part* part) const;
   struct Results;
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
-                       Results* results, ThreadPool* pool);
+                       const soft_step::ContactSet& recyclable, Results* results, ThreadPool* pool);
   template <class Find, class AppendAll>
   void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
                       const AppendAll& append_all);
 
   std::unique_ptr<BroadPhaseSearch> broad_phase_;
   SubShapeTable sub_shapes_;
-  std::vector<Candidate> candidates_;
+  std::vector<Candidate> candidates_, merged_candidates_;
   FixedTrees fixed_trees_;
   bool fixed_changed_ = true;          ///< whether solids of mass 0 need new bounds
   std::vector<Vec3> motion_;           ///< by body [m]

@@ -68,7 +68,10 @@ struct SweptBounds {
     const std::uint32_t x = sub_shapes.body(a), y = sub_shapes.body(b);
     const bool any_movable = bodies.movable(x) || bodies.movable(y);
     if (x == y || !any_movable || !bodies.may_collide(x, y)) return PairKind::none;
-    if (!sub_shapes.is_sphere(b)) return PairKind::general;
+    if (!sub_shapes.is_sphere(b)) {
+      const bool meet = may_meet(a, b) && (sub_shapes.is_sphere(a) || may_meet(b, a));
+      return meet ? PairKind::general : PairKind::none;
+    }
     return bodies.radius[x] > 0 && bodies.radius[y] > 0 ? PairKind::spheres : PairKind::compounds;
   }
 
@@ -79,24 +82,24 @@ struct SweptBounds {
                                     2 * smaller(margins[a], margins[b]));
   }
 
-  /// Whether the swept bounds of a movable sub-shape touch a fixed one. Conservative.
-  JFPX_HD bool may_meet(SubShape i, SubShape fixed) const {
-    if (sub_shapes.is_wall(fixed)) {
+  /// Whether the swept bounds of a solid touch another sub-shape than a sphere. Conservative.
+  JFPX_HD bool may_meet(SubShape i, SubShape other) const {
+    if (sub_shapes.is_wall(other)) {
       const Vec3& centre = bodies.position[sub_shapes.body(i)];
-      const HalfSpace solid = sub_shapes.wall(fixed).solid_for(centre);
+      const HalfSpace solid = sub_shapes.wall(other).solid_for(centre);
       const Real height = dot(solid.normal, swept[i].centre) - solid.offset;
       return height <= swept[i].radius + 8 * kEpsilon * absolute(solid.offset);
     }
-    const Real most = swept[i].radius + swept[fixed].radius;
-    if (!(length_squared(swept[i].centre - swept[fixed].centre) <=
+    const Real most = swept[i].radius + swept[other].radius;
+    if (!(length_squared(swept[i].centre - swept[other].centre) <=
           most * most * (1 + 64 * kEpsilon)))
       return false;
     // The bounding sphere of a wide floor contains everything above it. During the step, each
     // point of the solid stays within 2 * moved of the solid at the start.
-    const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
-    const PosedSolid& posed = sub_shapes.solid(fixed);
+    const Real moved = swept[other].radius - sub_shapes.bounds(other).radius;
+    const PosedSolid& posed = sub_shapes.solid(other);
     const Vec3& centre = swept[i].centre;
-    const Real far = sum(posed.pose.origin) + swept[fixed].radius + sum(centre);
+    const Real far = sum(posed.pose.origin) + swept[other].radius + sum(centre);
     // A centre at a distance of at most kEpsilon counts as inside.
     const Real radius =
         swept[i].radius + posed.solid.radius + 2 * moved + 16 * kEpsilon * far + kEpsilon;
@@ -110,6 +113,16 @@ struct SweptBounds {
     const SubShape p = pair.sub_shape_a, q = pair.sub_shape_b;
     if (sub_shapes.is_wall(q)) return 2 * margins[p] + spin(p);
     return 2 * smaller(margins[p], margins[q]) + spin(p) + spin(q);
+  }
+
+  /// [m], the part of margin_of() that does not depend on motion, for two solids
+  JFPX_HD Real distance_margin(const Candidate& pair) const {
+    return 2 * smaller(margins[pair.sub_shape_a], margins[pair.sub_shape_b]);
+  }
+  /// [m], the smaller bounding radius of two solids
+  JFPX_HD Real smaller_radius(const Candidate& pair) const {
+    return smaller(sub_shapes.bounds(pair.sub_shape_a).radius,
+                   sub_shapes.bounds(pair.sub_shape_b).radius);
   }
 
   /// Bounds of a solid of mass 0 in the tree. If they do not overlap query_bounds() of a movable

@@ -199,7 +199,14 @@ struct ShapeProgram {
     const StepData& d = data;
     const Candidate& pair = d.candidates[i];
     CandidateManifold* found = &d.tested[i];
-    test_candidate(d.swept_bounds, pair, found);
+    const soft_step::ContactView last = d.last_contacts();
+    test_candidate(
+        d.swept_bounds, pair, last.points,
+        [&](const soft_step::ContactKey& key) {
+          const std::uint32_t before = d.find_last_manifold(key);
+          return before == kNone ? nullptr : &last.manifolds[before];
+        },
+        found);
     if (found->touch_count > 0) add_touches(pair, *found);
     if (found->point_count == 0) return;
     prepend(&d.first_candidate[found->key.a], d.next_candidate, i);
@@ -244,12 +251,12 @@ struct ShapeProgram {
     for (std::uint32_t i = first; i != kNone; i = d.next_candidate[i]) {
       const CandidateManifold& found = d.tested[i];
       d.now().view.manifolds[manifold++] = {found.key, found.normal, point, found.point_count, 0,
-                                            0};
+                                            0,         found.tested};
       for (std::uint32_t k = 0; k < found.point_count; ++k, ++point) {
         if (point >= d.capacity.points) continue;
         // Copies the members, because the padding of a point is not initialized.
         const soft_step::PointInput& p = found.points[k];
-        d.now().view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature};
+        d.now().view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature, p.tested_distance};
       }
     }
     range.end = manifold;

@@ -52,32 +52,6 @@ struct MatchProgram {
  private:
   static constexpr std::uint64_t kNoOrder = ~std::uint64_t{0};
 
-  /// The contact with this key in a range that is sorted by key; kNone if there is none.
-  template <class Contact>
-  JFPX_HD static std::uint32_t find(const Contact* contacts, Range range,
-                                    const soft_step::ContactKey& key) {
-    while (range.begin < range.end) {
-      const std::uint32_t middle = range.begin + (range.end - range.begin) / 2;
-      const soft_step::ContactKey& other = contacts[middle].key;
-      if (other.b == key.b && other.part_a == key.part_a && other.part_b == key.part_b)
-        return middle;
-      const bool is_before = other.b != key.b             ? other.b < key.b
-                             : other.part_a != key.part_a ? other.part_a < key.part_a
-                                                          : other.part_b < key.part_b;
-      if (is_before) {
-        range.begin = middle + 1;
-      } else {
-        range.end = middle;
-      }
-    }
-    return kNone;
-  }
-
-  /// See EditProgram.
-  JFPX_HD static bool is_of_removed_body(const soft_step::ContactView& last, std::uint32_t i) {
-    return last.colors[i] == soft_step::kNoColor;
-  }
-
   /// @returns the color of the last step, or kNoColor
   JFPX_HD std::uint8_t match_sphere(std::uint32_t i) const {
     const StepData& d = data;
@@ -87,8 +61,8 @@ struct MatchProgram {
     if (i + 1 == now.sphere_count || now.spheres[i + 1].key.a != key.a) {
       d.now().spheres_of[key.a].end = i + 1;
     }
-    const std::uint32_t before = find(last.spheres, d.last().spheres_of[key.a], key);
-    if (before == kNone || is_of_removed_body(last, before)) {
+    const std::uint32_t before = d.find_last(last.spheres, d.last().spheres_of[key.a], key, 0);
+    if (before == kNone) {
       now.impulses[i] = {};
       now.rolling_impulses[i] = {};
       return soft_step::kNoColor;
@@ -106,9 +80,8 @@ struct MatchProgram {
     for (std::uint32_t p = 0; p < contact.count; ++p) {
       now.impulses[now.sphere_count + contact.first + p] = {};
     }
-    const std::uint32_t before =
-        find(last.manifolds, data.last().manifolds_of[contact.key.a], contact.key);
-    if (before == kNone || is_of_removed_body(last, last.sphere_count + before)) {
+    const std::uint32_t before = data.find_last_manifold(contact.key);
+    if (before == kNone) {
       now.rolling_impulses[i] = {};
       return soft_step::kNoColor;
     }

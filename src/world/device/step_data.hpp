@@ -4,6 +4,7 @@
 #include <jfpx/cuda/sphere_collider.hpp>
 
 #include "src/contact_solver/soft_step/blocks.hpp"
+#include "src/contact_solver/soft_step/contact_lookup.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
 #include "src/world/contacts/candidate_test.hpp"
 #include "src/world/device/body_cells.hpp"
@@ -284,6 +285,22 @@ struct StepData {
     view.point_count = sizes.points;
     return view;
   }
+  /// Finds a contact of the last step in the range of its body a. EditProgram has marked contacts
+  /// of removed bodies as uncolored.
+  /// @param offset number of the first contact of the list
+  /// @returns its index in the list; kNone if there is none
+  template <class Contact>
+  JFPX_HD std::uint32_t find_last(const Contact* contacts, const Range& range,
+                                  const soft_step::ContactKey& key, std::uint32_t offset) const {
+    const std::uint32_t found =
+        soft_step::find_contact(contacts, range.begin, range.end, key, kNone);
+    if (found == kNone || last().view.colors[offset + found] == soft_step::kNoColor) return kNone;
+    return found;
+  }
+  JFPX_HD std::uint32_t find_last_manifold(const soft_step::ContactKey& key) const {
+    const soft_step::ContactView contacts = last_contacts();
+    return find_last(contacts.manifolds, last().manifolds_of[key.a], key, contacts.sphere_count);
+  }
   JFPX_HD soft_step::JointView joints() const {
     const DeviceJoints& all = world_joints;
     return {all.inputs, all.kept[1 - parity()], all.kept[parity()], all.count};
@@ -307,7 +324,8 @@ struct StepData {
              bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
              materials, bodies.position, step.orientation},
             step.solver,
-            constants.restitution_threshold};
+            constants.restitution_threshold,
+            constants.inverse_friction_gap};
   }
   /// Whether the step has no effect, because an earlier step was not completed or changes of the
   /// host are pending.

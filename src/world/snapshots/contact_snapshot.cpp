@@ -3,6 +3,7 @@
 
 #include "src/world/snapshots/snapshot_fields.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace jfpx {
@@ -17,6 +18,10 @@ void serialize(auto& archive, Is<KeptImpulse> auto& impulse) {
   auto& [friction, normal] = impulse;
   archive(friction, normal);
 }
+void serialize(auto& archive, Is<TestedPoses> auto& tested) {
+  auto& [orientation_a, orientation_b, offset] = tested;
+  archive(orientation_a, orientation_b, offset);
+}
 
 }  // namespace soft_step
 namespace {
@@ -26,6 +31,8 @@ using soft_step::ContactSet;
 using soft_step::KeptImpulse;
 using soft_step::ManifoldInput;
 using soft_step::PointInput;
+
+constexpr std::uint32_t kMostPoints = detail::PairManifold::kMaxPoints;
 
 /// Checks the invariants of contact lists on which the next step depends.
 class Checker {
@@ -127,6 +134,35 @@ ContactSet read_contacts(BinaryReader* reader, const BodyStore& bodies, Snapshot
       set.impulses.size() + set.size() <= std::numeric_limits<std::uint32_t>::max(),
       "it has too many contacts");
   return set;
+}
+
+bool any_recyclable(const ContactSet& set) {
+  return std::ranges::any_of(set.manifolds,
+                             [](const ManifoldInput& m) { return m.tested.are_set(); });
+}
+
+void write_tests(BinaryWriter* writer, const ContactSet& set) {
+  BinaryWriter& write = *writer;
+  for (const ManifoldInput& manifold : set.manifolds) {
+    write(manifold.tested.are_set());
+    if (!manifold.tested.are_set()) continue;
+    write(manifold.tested);
+    for (std::uint32_t p = manifold.first; p < manifold.first + manifold.count; ++p) {
+      write(set.points[p].arm_b, set.points[p].tested_distance);
+    }
+  }
+}
+
+void read_tests(BinaryReader* reader, ContactSet* set) {
+  for (ManifoldInput& manifold : set->manifolds) {
+    if (!reader->get<bool>()) continue;
+    (*reader)(manifold.tested);
+    BinaryReader::require(manifold.tested.are_set() && manifold.count <= kMostPoints,
+                          "a contact cannot be recycled");
+    for (std::uint32_t p = manifold.first; p < manifold.first + manifold.count; ++p) {
+      (*reader)(set->points[p].arm_b, set->points[p].tested_distance);
+    }
+  }
 }
 
 }  // namespace JFPX_ABI

@@ -3,8 +3,9 @@
 /// Layout, little-endian: magic (8 bytes), version and size of Real (4 bytes each), length of the
 /// content (8 bytes), the content, and the checksum of all preceding bytes (8 bytes). A change of
 /// the content requires another version. Version 2 has joints after the content of version 1, and
-/// version 3 the places of bodies in the partition into blocks after them. A world that never had
-/// joints and blocks has snapshots of version 1.
+/// version 3 the places of bodies in the partition into blocks after them, and version 4 what
+/// recycle() reads of the contacts of boxes. A world that never had these has snapshots of
+/// version 1.
 #include "src/world/snapshots/snapshot_file.hpp"
 
 #include "src/base/file.hpp"
@@ -19,7 +20,7 @@ inline namespace JFPX_ABI {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'J', 'F', 'P', 'X', 'S', 'N', 'P', '\n'};
-constexpr std::uint32_t kVersion = 1, kLatestVersion = 3;
+constexpr std::uint32_t kVersion = 1, kLatestVersion = 4;
 
 struct Header {
   std::array<char, 8> magic = kMagic;

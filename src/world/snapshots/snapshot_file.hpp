@@ -15,6 +15,7 @@ enum class SnapshotParts : std::uint8_t {
   none,
   joints,
   joints_and_places,  ///< of a world that is or was divided into blocks
+  recyclable,         ///< also of a world with contacts of boxes
 };
 
 /// Writes the header; the content must follow.

@@ -54,9 +54,9 @@ void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> g
     const Contact& c = generated[i];
     const auto point = static_cast<std::uint32_t>(set.points.size());
     set.points.push_back({c.point - bodies.moving.position[c.a.index],
-                          c.point - bodies.moving.position[c.b.index], c.distance, 0});
+                          c.point - bodies.moving.position[c.b.index], c.distance, 0, 0});
     const ContactKey key{c.a.index, c.b.index, ContactKey::kGenerated, i};
-    set.manifolds.push_back({key, c.normal, point, 1, c.friction, c.restitution});
+    set.manifolds.push_back({key, c.normal, point, 1, c.friction, c.restitution, {}});
   }
   std::ranges::sort(set.manifolds, by_key);
   // Numbered per pair of bodies, so that a new or missing contact does not renumber other pairs.
@@ -196,7 +196,8 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
                                 .position = view.position,
                                 .orientation = orientation_.data()},
                  .start = bodies_.data(),
-                 .restitution_threshold = constants_.restitution_threshold},
+                 .restitution_threshold = constants_.restitution_threshold,
+                 .inverse_friction_gap = constants_.inverse_friction_gap},
                 bodies_, bodies->mobile(), bodies->moving.place, bodies->has_blocks(),
                 {step_.bodies.last_acceleration, free_.data()}, constants_);
   run_substeps(*bodies);

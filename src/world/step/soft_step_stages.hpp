@@ -136,10 +136,12 @@ struct StepBodies {
   JFPX_HD bool store(std::uint32_t i) const {
     bool rests = false;
     if (bodies.awake[i] != 0) {
+      const SolverBody& body = solver[i];
+      const StepMotion moved{body.shift, body.rotation, body.velocity - bodies.velocity[i]};
       motion.end_step(bodies, i, state(i));
       if (bodies.movable(i)) {
         const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{});
-        motion.update_rest_time(bodies, i, is_driven);
+        motion.update_rest_time(bodies, i, is_driven, moved);
         rests = bodies.is_at_rest(i);
       }
     }

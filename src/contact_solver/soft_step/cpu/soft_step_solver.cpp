@@ -44,19 +44,69 @@ static_assert(offsetof(SolverBody, angular_velocity) ==
 static_assert(offsetof(SolverBody, inverse_inertia) == 7 * kReal);
 static_assert(offsetof(SolverBody, shift) == cpu::solver_body_quad::kShift * kReal);
 
-const cpu::SphereSweepKernels* kernels_for(SimdLevel level) {
+static_assert(offsetof(SolverBody, rotation) == cpu::solver_body_quad::kRotation * kReal);
+
+// The layout that manifold_sweep.hpp assumes.
+namespace manifold = cpu::manifold_row_offset;
+static_assert(sizeof(ManifoldRow) == manifold::kStride * kReal);
+static_assert(offsetof(ManifoldRow, a) == manifold::kNumbers * kReal);
+static_assert(offsetof(ManifoldRow, b) == offsetof(ManifoldRow, a) + 4);
+static_assert(offsetof(ManifoldRow, first) == offsetof(ManifoldRow, a) + 8);
+static_assert(offsetof(ManifoldRow, count) == offsetof(ManifoldRow, a) + 12);
+static_assert(offsetof(ManifoldRow, normal) == manifold::kNormal * kReal);
+static_assert(offsetof(ManifoldRow, friction) == (manifold::kNormal + 3) * kReal);
+static_assert(offsetof(ManifoldRow, tangent) == manifold::kTangent * kReal);
+static_assert(offsetof(ManifoldRow, twist_arm) == (manifold::kTangent + 3) * kReal);
+static_assert(offsetof(ManifoldRow, bitangent) == manifold::kBitangent * kReal);
+static_assert(offsetof(ManifoldRow, twist_mass) == (manifold::kBitangent + 3) * kReal);
+static_assert(offsetof(ManifoldRow, x) == manifold::kLeverX * kReal);
+static_assert(offsetof(ManifoldRow, y) == manifold::kLeverY * kReal);
+static_assert(offsetof(Lever, turn_b) == 3 * kReal && offsetof(Lever, spin_a) == 6 * kReal);
+static_assert(offsetof(Lever, spin_b) == 9 * kReal && sizeof(Lever) == 12 * kReal);
+static_assert(offsetof(ManifoldRow, twist_a) == manifold::kTwist * kReal);
+static_assert(offsetof(ManifoldRow, xx) == (manifold::kTwist + 6) * kReal);
+static_assert(offsetof(ManifoldRow, xy) == (manifold::kTwist + 7) * kReal);
+static_assert(offsetof(ManifoldRow, friction_x) == manifold::kFrictionImpulses * kReal);
+static_assert(offsetof(ManifoldRow, friction_y) == (manifold::kFrictionImpulses + 1) * kReal);
+static_assert(offsetof(ManifoldRow, twist_impulse) == (manifold::kFrictionImpulses + 2) * kReal);
+static_assert(offsetof(ManifoldRow, yy) == (manifold::kFrictionImpulses + 3) * kReal);
+static_assert(offsetof(ManifoldRow, slip_mass) == manifold::kRolling * kReal);
+static_assert(offsetof(ManifoldRow, rolling_friction) == (manifold::kRolling + 1) * kReal);
+static_assert(offsetof(ManifoldRow, spinning_friction) == (manifold::kRolling + 2) * kReal);
+static_assert(sizeof(PointRow) == cpu::kSweepStride * kReal);
+static_assert(offsetof(PointRow, turn_a) == cpu::point_row_quad::kTurnA * kReal);
+static_assert(offsetof(PointRow, distance) == (cpu::point_row_quad::kTurnA + 3) * kReal);
+static_assert(offsetof(PointRow, turn_b) == cpu::point_row_quad::kTurnB * kReal);
+static_assert(offsetof(PointRow, normal_mass) == (cpu::point_row_quad::kTurnB + 3) * kReal);
+static_assert(offsetof(PointRow, spin_a) == cpu::point_row_quad::kSpinA * kReal);
+static_assert(offsetof(PointRow, normal_impulse) == (cpu::point_row_quad::kSpinA + 3) * kReal);
+static_assert(offsetof(PointRow, spin_b) == cpu::point_row_quad::kSpinB * kReal);
+static_assert(offsetof(PointRow, rebound) == (cpu::point_row_quad::kSpinB + 3) * kReal);
+
+bool has_avx2(SimdLevel level) {
 #if defined(__x86_64__)
-  if (level >= SimdLevel::avx2) return &cpu::kAvx2SphereSweep;
+  return level >= SimdLevel::avx2;
 #else
   static_cast<void>(level);
+  return false;
 #endif
-  return nullptr;
+}
+
+cpu::SweepSoftness softness(const Softness& s) {
+  return {s.bias_rate, s.mass_scale, s.impulse_scale};
+}
+
+/// The function of kernels for a sweep.
+template <class Kernels>
+auto function_of(const Kernels& kernels, Sweep sweep) {
+  if (sweep == Sweep::warm_start) return kernels.warm_start;
+  return kernels.solve[sweep == Sweep::bias ? 1 : 0];
 }
 
 }  // namespace
 
 SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
-    : pool_(pool), kernels_(kernels_for(usable_simd_level(simd))) {}
+    : pool_(pool), uses_avx2_(has_avx2(usable_simd_level(simd))) {}
 
 /// Fills kinds_ and shape_, and lists the contacts with fixed bodies and in the overflow.
 void SoftStepSolver::inspect_contacts() {
@@ -83,7 +133,7 @@ void SoftStepSolver::inspect_contacts() {
       const std::uint32_t color = setup_.color_of(i);
       if (!is_color(color)) {
         if (listed_count == listed.size()) flush();
-        listed[listed_count++] = {setup_.movable_body(setup_.key(i)), i, 0, kinds_[i]};
+        listed[listed_count++] = {setup_.movable_body(setup_.key(i)), i, 0, 0, kinds_[i]};
         continue;
       }
       std::uint32_t& end = is_of_block(color) ? ends.inner : ends.crossing;
@@ -209,51 +259,49 @@ void SoftStepSolver::for_contacts(std::size_t part, const F& f) const {
   }
 }
 
-/// The rows of a part, by kind: their numbers, or the next ones.
+/// The rows of a part, by kind.
 struct SoftStepSolver::Cursors {
   struct Kind {
-    std::array<std::uint32_t, kColorsPerClass> inner, crossing;
-    std::uint32_t fixed, part;
+    std::array<Place, kColorsPerClass> inner, crossing;
+    Place fixed;
 
-    std::uint32_t* at(bool is_of_block, std::uint32_t color) {
+    Place* at(bool is_of_block, std::uint32_t color) {
       return &(is_of_block ? inner : crossing)[number_in_class(color)];
     }
   };
   std::array<Kind, kRowKinds> kinds;
 };
 
+/// Adds the row of a contact to a count.
+void SoftStepSolver::count(std::uint32_t contact, Place* place) const {
+  ++place->row;
+  if (!setup_.is_joint(contact)) place->point += setup_.contacts.impulse_count(contact);
+}
+
 /// Counts the rows of a part, and their points.
 void SoftStepSolver::count_rows(std::size_t part) {
   Cursors counts{};
   for_contacts(part, [&](std::uint32_t contact, std::uint32_t color) {
-    Cursors::Kind& kind = counts.kinds[kinds_[contact]];
-    ++*kind.at(is_of_block(color), color);
-    if (!setup_.is_joint(contact)) kind.part += setup_.contacts.impulse_count(contact);
+    count(contact, counts.kinds[kinds_[contact]].at(is_of_block(color), color));
   });
   for_all_kinds([&]<class Row>(Rows<Row>* rows) {
     const Cursors::Kind& kind = counts.kinds[kKindOf<Row>];
-    RowTable& table = rows->table;
     for (std::size_t c = 0; c < shape_.inner_colors; ++c) {
-      table.set_size(table.inner(part, c), kind.inner[c]);
+      rows->set_size(rows->table.inner(part, c), kind.inner[c]);
     }
     for (std::size_t c = 0; c < shape_.crossing_colors; ++c) {
-      table.set_size(table.crossing(part, c), kind.crossing[c]);
+      rows->set_size(rows->table.crossing(part, c), kind.crossing[c]);
     }
-    if constexpr (kHasParts<Row>) rows->first_part[part] = kind.part;
   });
 }
 
 void SoftStepSolver::count_fixed_rows(std::size_t part) {
   Cursors counts{};
   for (const ListedContact& fixed : fixed_of(part)) {
-    Cursors::Kind& kind = counts.kinds[fixed.kind];
-    ++kind.fixed;
-    if (!setup_.is_joint(fixed.contact)) kind.part += setup_.contacts.impulse_count(fixed.contact);
+    count(fixed.contact, &counts.kinds[fixed.kind].fixed);
   }
   for_all_kinds([&]<class Row>(Rows<Row>* rows) {
-    const Cursors::Kind& kind = counts.kinds[kKindOf<Row>];
-    rows->table.set_size(rows->table.fixed(part), kind.fixed);
-    if constexpr (kHasParts<Row>) rows->first_part[shape_.parts + part] = kind.part;
+    rows->set_size(rows->table.fixed(part), counts.kinds[kKindOf<Row>].fixed);
   });
 }
 
@@ -262,55 +310,60 @@ void SoftStepSolver::place_rows(std::size_t part) {
   Cursors next;
   for_all_kinds([&]<class Row>(Rows<Row>* rows) {
     Cursors::Kind& kind = next.kinds[kKindOf<Row>];
-    const RowTable& table = rows->table;
     for (std::size_t c = 0; c < shape_.inner_colors; ++c) {
-      kind.inner[c] = table.begin(table.inner(part, c));
+      kind.inner[c] = rows->begin(rows->table.inner(part, c));
     }
     for (std::size_t c = 0; c < shape_.crossing_colors; ++c) {
-      kind.crossing[c] = table.begin(table.crossing(part, c));
+      kind.crossing[c] = rows->begin(rows->table.crossing(part, c));
     }
-    if constexpr (kHasParts<Row>) kind.part = rows->first_part[part];
   });
   for_contacts(part, [&](std::uint32_t contact, std::uint32_t color) {
     Cursors::Kind& kind = next.kinds[kinds_[contact]];
-    fill<false>(kinds_[contact], contact, (*kind.at(is_of_block(color), color))++, &kind.part);
+    fill<false>(kinds_[contact], contact, kind.at(is_of_block(color), color));
   });
 }
 
-/// place_rows() for rows with fixed bodies, in the order of fixed_.
+/// place_rows() for rows with fixed bodies. Sorts them by rank, so that consecutive rows have
+/// different movable bodies.
 void SoftStepSolver::place_fixed_rows(std::size_t part) {
   Cursors next;
   for_all_kinds([&]<class Row>(Rows<Row>* rows) {
-    Cursors::Kind& kind = next.kinds[kKindOf<Row>];
-    kind.fixed = rows->table.begin(rows->table.fixed(part));
-    if constexpr (kHasParts<Row>) kind.part = rows->first_part[shape_.parts + part];
+    next.kinds[kKindOf<Row>].fixed = rows->begin(rows->table.fixed(part));
   });
   const std::span<ListedContact> fixed = fixed_of(part);
   std::ranges::sort(fixed, [this](const ListedContact& x, const ListedContact& y) {
     return x.body != y.body ? x.body < y.body
                             : setup_.fixed_order(x.contact) < setup_.fixed_order(y.contact);
   });
+  for (std::size_t i = 0; i < fixed.size(); ++i) {
+    const bool is_next = i > 0 && fixed[i].body == fixed[i - 1].body;
+    fixed[i].rank = is_next ? fixed[i - 1].rank + 1 : 0;
+  }
+  std::ranges::sort(fixed, [](const ListedContact& x, const ListedContact& y) {
+    return std::tie(x.rank, x.kind, x.body) < std::tie(y.rank, y.kind, y.body);
+  });
   for (ListedContact& listed : fixed) {
-    Cursors::Kind& kind = next.kinds[listed.kind];
-    listed.row = kind.fixed++;
-    fill<true>(listed.kind, listed.contact, listed.row, &kind.part);
+    listed.row = fill<true>(listed.kind, listed.contact, &next.kinds[listed.kind].fixed);
   }
 }
 
-/// Builds the row of a contact. @param part next part, for kinds with parts
+/// Builds the row of a contact. @param place of the row; receives that of the next one
+/// @returns the number of the row
 template <bool kFixed>
-void SoftStepSolver::fill(RowKind kind, std::uint32_t contact, std::uint32_t row,
-                          std::uint32_t* part) {
+std::uint32_t SoftStepSolver::fill(RowKind kind, std::uint32_t contact, Place* place) {
+  const std::uint32_t number = place->row;
   visit_row(kind, [&]<class Row>(std::type_identity<Row>) {
     Rows<Row>& all = rows<Row>();
-    Row& r = all.rows[row];
-    if constexpr (kHasParts<Row>) {
-      r.first = *part;
-      *part += setup_.contacts.impulse_count(contact);
+    Row& row = all.rows[number];
+    if constexpr (kHasParts<Row>) row.first = place->point;
+    all.contacts[number] = contact;
+    setup_.fill<kFixed>(&row, all.parts_of(row), contact);
+    if constexpr (std::is_same_v<Row, ManifoldRow>) {
+      if (any_rebounds(row, all.parts_of(row))) any_rebound_.store(true, std::memory_order_relaxed);
     }
-    all.contacts[row] = contact;
-    setup_.fill<kFixed>(&r, all.parts_of(r), contact);
   });
+  count(contact, place);
+  return number;
 }
 
 void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
@@ -322,6 +375,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   constants_ = constants;
   bodies_ = bodies;
   has_blocks_ = has_blocks;
+  any_rebound_.store(false, std::memory_order_relaxed);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
   if (has_blocks) {
@@ -338,33 +392,21 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
 
 /// Counts the rows, and reserves memory for them.
 void SoftStepSolver::allocate_rows() {
-  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
-    rows->table.start(shape_);
-    if constexpr (kHasParts<Row>) {
-      assign_geometric(&rows->first_part, shape_.parts + shape_.fixed_parts + 2, 0);
-    }
-  });
+  for_all_kinds([&](auto* rows) { rows->start(shape_); });
   for_parts(shape_.parts, [this](std::size_t part) { count_rows(part); });
   for_parts(shape_.fixed_parts, [this](std::size_t part) { count_fixed_rows(part); });
   for_all_kinds([&]<class Row>(Rows<Row>* rows) {
-    RowTable& table = rows->table;
-    std::uint32_t overflow = 0;
+    Place overflow;
     for (const ListedContact& listed : overflow_) {
-      if (listed.kind != kKindOf<Row>) continue;
-      ++overflow;
-      if constexpr (kHasParts<Row>) {
-        rows->first_part[shape_.parts + shape_.fixed_parts] +=
-            setup_.contacts.impulse_count(listed.contact);
-      }
+      if (listed.kind == kKindOf<Row>) count(listed.contact, &overflow);
     }
-    table.set_size(table.overflow(), overflow);
-    table.scan();
-    rows->rows.reserve_geometric(table.size(), "rows of contacts");
-    rows->contacts.reserve_geometric(table.size(), "rows of contacts");
+    rows->set_size(rows->table.overflow(), overflow);
+    rows->table.scan();
+    rows->rows.reserve_geometric(rows->table.size(), "rows of contacts");
+    rows->contacts.reserve_geometric(rows->table.size(), "rows of contacts");
     if constexpr (kHasParts<Row>) {
-      std::vector<std::uint32_t>& first = rows->first_part;
-      std::exclusive_scan(first.begin(), first.end(), first.begin(), 0u);
-      rows->parts.reserve_geometric(first.back(), "points of contacts");
+      rows->part_table.scan();
+      rows->parts.reserve_geometric(rows->part_table.size(), "points of contacts");
     }
   });
 }
@@ -372,14 +414,10 @@ void SoftStepSolver::allocate_rows() {
 void SoftStepSolver::place_overflow() {
   Cursors next;
   for_all_kinds([&]<class Row>(Rows<Row>* rows) {
-    Cursors::Kind& kind = next.kinds[kKindOf<Row>];
-    kind.fixed = rows->table.begin(rows->table.overflow());
-    if constexpr (kHasParts<Row>) kind.part = rows->first_part[shape_.parts + shape_.fixed_parts];
+    next.kinds[kKindOf<Row>].fixed = rows->begin(rows->table.overflow());
   });
   for (ListedContact& listed : overflow_) {
-    Cursors::Kind& kind = next.kinds[listed.kind];
-    listed.row = kind.fixed++;
-    fill<false>(listed.kind, listed.contact, listed.row, &kind.part);
+    listed.row = fill<false>(listed.kind, listed.contact, &next.kinds[listed.kind].fixed);
   }
 }
 
@@ -392,20 +430,18 @@ void SoftStepSolver::for_parts(std::size_t parts, const F& f) {
   });
 }
 
-/// Calls f(operation, kernel) with the operation of a sweep, if any. The kernel is null if rows of
-/// spheres are solved one by one.
+/// Calls f(operation) with the operation of a sweep.
 template <class F>
 void SoftStepSolver::with_operation(Sweep sweep, const F& f) {
-  const cpu::SphereSweepKernels* const k = kernels_;
   switch (sweep) {
     case Sweep::warm_start:
-      return f(WarmStart(), k != nullptr ? k->warm_start : nullptr);
+      return f(WarmStart());
     case Sweep::bias:
-      return f(Solve<true>{constants_}, k != nullptr ? k->solve[1] : nullptr);
+      return f(Solve<true>{constants_});
     case Sweep::relax:
-      return f(Solve<false>{constants_}, k != nullptr ? k->solve[0] : nullptr);
+      return f(Solve<false>{constants_});
     case Sweep::restitution:
-      return f(Restitute(), static_cast<cpu::SphereSweepFunction>(nullptr));
+      return f(Restitute());
   }
 }
 
@@ -431,41 +467,65 @@ void SoftStepSolver::run_row(Rows<Row>* rows, std::size_t i, const Operation& op
   operation.template run<decltype(is_fixed)::value>(&row, context);
 }
 
-/// Solves consecutive rows of two movable bodies, which have no common body.
-template <class Row, class Operation>
-void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t last,
-                              const Operation& operation, cpu::SphereSweepFunction kernel) {
-  if (!std::is_same_v<Row, SphereRow> || kernel == nullptr) {
-    for (std::size_t i = first; i < last; ++i) run_row(rows, i, operation, std::false_type());
-    return;
+/// Solves rows in vectors. @returns the number of skipped rows, which are written to `left`
+template <class Row, bool kFixed>
+std::size_t SoftStepSolver::run_kernel(Sweep sweep, std::size_t first, std::size_t last,
+                                       std::uint32_t* left) {
+#if defined(__x86_64__)
+  if constexpr (std::is_same_v<Row, ManifoldRow>) {
+    const auto kernel = function_of(cpu::kAvx2ManifoldSweep[kFixed ? 1 : 0], sweep);
+    return kernel(manifold_sweep(kFixed), first, last, left);
+  } else {
+    return function_of(cpu::kAvx2SphereSweep, sweep)(sphere_sweep(), first, last, left);
   }
-  const cpu::SphereSweep arrays = sphere_sweep();
-  for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
-    std::array<std::uint32_t, kRowsPerKernel> skipped;
-    const std::size_t end = std::min(last, begin + kRowsPerKernel);
-    const std::size_t count = kernel(arrays, begin, end, skipped.data());
-    for (std::size_t k = 0; k < count; ++k) {
-      run_row(rows, skipped[k], operation, std::false_type());
-    }
-  }
+#else
+  return 0;  // not called
+#endif
 }
 
+/// Solves consecutive rows. The movable bodies of each are different from those of all others.
+template <bool kFixed, class Row, class Operation>
+void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, Sweep sweep,
+                              const Operation& operation) {
+  using IsFixed = std::bool_constant<kFixed>;
+  constexpr bool kHasKernel =
+      std::is_same_v<Row, ManifoldRow> || (std::is_same_v<Row, SphereRow> && !kFixed);
+  if constexpr (kHasKernel) {
+    if (uses_avx2_ && sweep != Sweep::restitution) {
+      for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
+        std::array<std::uint32_t, kRowsPerKernel> skipped;
+        const std::size_t end = std::min(last, begin + kRowsPerKernel);
+        const std::size_t count = run_kernel<Row, kFixed>(sweep, begin, end, skipped.data());
+        for (std::size_t k = 0; k < count; ++k) run_row(rows, skipped[k], operation, IsFixed());
+      }
+      return;
+    }
+  }
+  for (std::size_t i = first; i < last; ++i) run_row(rows, i, operation, IsFixed());
+}
+
+/// Solves the rows with the fixed bodies of a part: runs of the same rank and kind.
 void SoftStepSolver::sweep_fixed(std::size_t part, Sweep sweep) {
-  with_operation(sweep, [&](const auto& operation, auto) {
-    for (const ListedContact& listed : fixed_of(part)) {
-      visit_row(listed.kind, [&]<class Row>(std::type_identity<Row>) {
-        run_row(&rows<Row>(), listed.row, operation, std::true_type());
+  const std::span<const ListedContact> fixed = fixed_of(part);
+  with_operation(sweep, [&](const auto& operation) {
+    for (std::size_t first = 0, last = 0; first < fixed.size(); first = last) {
+      const ListedContact& run = fixed[first];
+      while (last < fixed.size() && fixed[last].rank == run.rank && fixed[last].kind == run.kind) {
+        ++last;
+      }
+      visit_row(run.kind, [&]<class Row>(std::type_identity<Row>) {
+        run_rows<true>(&rows<Row>(), run.row, run.row + (last - first), sweep, operation);
       });
     }
   });
 }
 
 void SoftStepSolver::sweep_inner(std::size_t block, Sweep sweep) {
-  with_operation(sweep, [&](const auto& operation, auto kernel) {
+  with_operation(sweep, [&](const auto& operation) {
     for (std::size_t color = 0; color < shape_.inner_colors; ++color) {
       for_all_kinds([&](auto* rows) {
         const std::size_t cell = rows->table.inner(block, color);
-        run_rows(rows, rows->table.begin(cell), rows->table.end(cell), operation, kernel);
+        run_rows<false>(rows, rows->table.begin(cell), rows->table.end(cell), sweep, operation);
       });
     }
   });
@@ -473,7 +533,7 @@ void SoftStepSolver::sweep_inner(std::size_t block, Sweep sweep) {
 
 void SoftStepSolver::sweep_crossing(Sweep sweep) {
   const std::size_t parts = shape_.parts;
-  with_operation(sweep, [&](const auto& operation, auto kernel) {
+  with_operation(sweep, [&](const auto& operation) {
     for (std::size_t color = 0; color < shape_.crossing_colors; ++color) {
       // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
       std::size_t count = 0;
@@ -488,8 +548,8 @@ void SoftStepSolver::sweep_crossing(Sweep sweep) {
       parallel_for(pool_, parts, chunk, [&](std::size_t first, std::size_t last) {
         for_all_kinds([&](auto* rows) {
           const RowTable& table = rows->table;
-          run_rows(rows, table.begin(table.crossing(first, color)),
-                   table.end(table.crossing(last - 1, color)), operation, kernel);
+          run_rows<false>(rows, table.begin(table.crossing(first, color)),
+                          table.end(table.crossing(last - 1, color)), sweep, operation);
         });
       });
     }
@@ -497,10 +557,10 @@ void SoftStepSolver::sweep_crossing(Sweep sweep) {
 }
 
 void SoftStepSolver::sweep_overflow(Sweep sweep) {
-  with_operation(sweep, [&](const auto& operation, auto kernel) {
+  with_operation(sweep, [&](const auto& operation) {
     for (const ListedContact& listed : overflow_) {
       visit_row(listed.kind, [&]<class Row>(std::type_identity<Row>) {
-        run_rows(&rows<Row>(), listed.row, listed.row + 1, operation, kernel);
+        run_rows<false>(&rows<Row>(), listed.row, listed.row + 1u, sweep, operation);
       });
     }
   });
@@ -517,11 +577,20 @@ void SoftStepSolver::sweep(Sweep sweep) {
   }
 }
 
+cpu::ManifoldSweep SoftStepSolver::manifold_sweep(bool is_fixed) {
+  const StepConstants& c = constants_;
+  return {reinterpret_cast<Real*>(rows<ManifoldRow>().rows.data()),
+          reinterpret_cast<Real*>(rows<ManifoldRow>().parts.data()),
+          reinterpret_cast<Real*>(bodies_.data()),
+          c.h,
+          c.inverse_h,
+          c.push_out_speed,
+          c.max_bias_velocity,
+          softness(is_fixed ? c.fixed : c.movable)};
+}
+
 cpu::SphereSweep SoftStepSolver::sphere_sweep() {
   const StepConstants& c = constants_;
-  const auto softness = [](const Softness& s) {
-    return cpu::SweepSoftness{s.bias_rate, s.mass_scale, s.impulse_scale};
-  };
   return {reinterpret_cast<Real*>(rows<SphereRow>().rows.data()),
           reinterpret_cast<Real*>(bodies_.data()),
           c.h,

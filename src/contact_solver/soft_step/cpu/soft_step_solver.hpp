@@ -6,11 +6,13 @@
 #include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/cpu/body_blocks.hpp"
+#include "src/contact_solver/soft_step/cpu/manifold_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/row_table.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
 
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -33,8 +35,9 @@ enum class Sweep : std::uint8_t {
 /// the other; the inner rows, by color; the crossing rows, by color; rows with immovable or
 /// kinematic bodies or with the world, by movable body, joints first. In the overflow, rows have
 /// the order of RowTypes. Rows of one color share no movable body, and inner rows of different
-/// blocks neither, so threads may solve them in any order. The same holds for rows of different
-/// movable bodies with fixed bodies.
+/// blocks neither, so threads and vectors may solve them in any order. The same holds for rows of
+/// different movable bodies with fixed bodies: first the first row of each body, then the second
+/// ones.
 ///
 /// Contacts are divided into parts: blocks, or ranges of contacts in a world of one block. A thread
 /// solves all inner rows of a block, so that the bodies stay in the cache of a core; threads share
@@ -45,7 +48,7 @@ enum class Sweep : std::uint8_t {
 class SoftStepSolver {
  public:
   /// @param pool not null; outlives the solver
-  /// @param simd widest vectors for rows of spheres
+  /// @param simd widest vectors for rows of contacts
   SoftStepSolver(ThreadPool* pool, SimdLevel simd);
 
   /// Builds rows of the contacts and joints whose kind is not kNoRow. Below, "contact" is the
@@ -61,11 +64,15 @@ class SoftStepSolver {
   /// A sweep over all rows.
   void sweep(Sweep sweep);
   /// Whether a restitution sweep has an effect.
-  bool needs_restitution() const { return rows<ManifoldRow>().table.size() > 0; }
+  bool needs_restitution() const { return any_rebound_.load(std::memory_order_relaxed); }
   /// Writes the impulses to the contacts that build() received.
   void store();
 
  private:
+  /// Numbers of rows and of their points: counts, or the next ones.
+  struct Place {
+    std::uint32_t row = 0, point = 0;
+  };
   /// The rows of a kind.
   template <class RowOfKind>
   struct Rows {
@@ -75,10 +82,19 @@ class SoftStepSolver {
     Buffer<Row> rows;
     Buffer<std::uint32_t> contacts;  ///< by row
     Buffer<Part> parts;
-    /// First of `parts` by part of the contacts, by part of the fixed contacts, then of the
-    /// overflow, and the end.
-    std::vector<std::uint32_t> first_part;
+    RowTable part_table;  ///< of `parts`, with the cells of `table`
 
+    void start(const RowTable::Shape& shape) {
+      table.start(shape);
+      if constexpr (kHasParts<Row>) part_table.start(shape);
+    }
+    void set_size(std::size_t cell, const Place& count) {
+      table.set_size(cell, count.row);
+      if constexpr (kHasParts<Row>) part_table.set_size(cell, count.point);
+    }
+    Place begin(std::size_t cell) const {
+      return {table.begin(cell), kHasParts<Row> ? part_table.begin(cell) : 0};
+    }
     Part* parts_of(const Row& row) {
       if constexpr (kHasParts<Row>) {
         return &parts[row.first];
@@ -98,6 +114,7 @@ class SoftStepSolver {
     std::uint32_t body = 0;  ///< the movable one
     std::uint32_t contact = 0;
     std::uint32_t row = 0;
+    std::uint32_t rank = 0;  ///< number of earlier contacts of the body with fixed bodies
     RowKind kind = kNoRow;
   };
   /// A joint of two movable bodies.
@@ -106,7 +123,6 @@ class SoftStepSolver {
     std::uint32_t contact = 0;  ///< its number
     friend auto operator<=>(const BlockJoint&, const BlockJoint&) = default;
   };
-  /// The next rows and parts of a block, while its rows are placed.
   struct Cursors;
 
   template <class Row>
@@ -136,7 +152,8 @@ class SoftStepSolver {
   void place_fixed_rows(std::size_t part);
   void place_overflow();
   template <bool kFixed>
-  void fill(RowKind kind, std::uint32_t contact, std::uint32_t row, std::uint32_t* part);
+  std::uint32_t fill(RowKind kind, std::uint32_t contact, Place* place);
+  void count(std::uint32_t contact, Place* place) const;
   template <class F>
   void for_parts(std::size_t parts, const F& f);
   void prefetch_contacts(std::uint32_t body) const;
@@ -152,20 +169,23 @@ class SoftStepSolver {
   bool is_of_block(std::uint32_t color) const { return has_blocks_ && is_inner_color(color); }
   template <class F>
   void with_operation(Sweep sweep, const F& f);
+  template <class Row, bool kFixed>
+  std::size_t run_kernel(Sweep sweep, std::size_t first, std::size_t last, std::uint32_t* left);
   template <class Row, class Operation>
   void run_row(Rows<Row>* rows, std::size_t row, const Operation& operation, auto is_fixed);
-  template <class Row, class Operation>
-  void run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, const Operation& operation,
-                cpu::SphereSweepFunction kernel);
+  template <bool kFixed, class Row, class Operation>
+  void run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, Sweep sweep,
+                const Operation& operation);
   void sweep_fixed(std::size_t part, Sweep sweep);
   void sweep_inner(std::size_t block, Sweep sweep);
   void sweep_crossing(Sweep sweep);
   void sweep_overflow(Sweep sweep);
   cpu::SphereSweep sphere_sweep();
+  cpu::ManifoldSweep manifold_sweep(bool is_fixed);
 
   ThreadPool* pool_;
-  const cpu::SphereSweepKernels* kernels_;  ///< null: rows are solved one by one
-  RowSetup setup_;                          ///< from build() to store()
+  bool uses_avx2_;  ///< otherwise rows are solved one by one
+  RowSetup setup_;  ///< from build() to store()
   ImpactBodies impacts_;
   StepConstants constants_;
   std::span<SolverBody> bodies_;
@@ -180,6 +200,7 @@ class SoftStepSolver {
   std::vector<ListedContact> overflow_;     ///< sorted by (kind, contact)
   std::vector<ListedContact> listed_;       ///< unsorted
   RowTable::Shape shape_;
+  std::atomic<bool> any_rebound_ = false;  ///< whether a restitution sweep has an effect
   RowsOfTypes<RowTypes>::type rows_;
   // Body b of a joint with the world.
   SolverBody world_;

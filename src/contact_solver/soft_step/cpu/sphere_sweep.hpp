@@ -2,9 +2,7 @@
 /// one.
 #pragma once
 
-// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason. Rows and
-// bodies are therefore arrays of Reals; soft_step_solver.cpp checks their layout.
-#include <jfpx/config.hpp>
+#include "src/contact_solver/soft_step/cpu/sweep_layout.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -12,9 +10,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
-
-/// Reals per SphereRow and per SolverBody.
-inline constexpr std::size_t kSweepStride = 16;
 
 /// Quadruples of Reals in a SphereRow.
 namespace sphere_row_quad {
@@ -24,18 +19,6 @@ inline constexpr std::size_t kFriction = 8;  ///< friction, arm a, arm b, normal
 inline constexpr std::size_t kTangentMass = 12;
 inline constexpr std::size_t kBodies = 14;  ///< the numbers of both bodies, 32 bits each
 }  // namespace sphere_row_quad
-
-/// Quadruples of Reals in a SolverBody.
-namespace solver_body_quad {
-inline constexpr std::size_t kVelocity = 0;         ///< velocity, inverse mass
-inline constexpr std::size_t kAngularVelocity = 4;  ///< angular velocity, inverse inertia
-inline constexpr std::size_t kShift = 8;            ///< shift, unused
-}  // namespace solver_body_quad
-
-/// Copy of soft_step::Softness.
-struct SweepSoftness {
-  Real bias_rate, mass_scale, impulse_scale;
-};
 
 /// Rows of pairs of movable spheres without common bodies.
 struct SphereSweep {

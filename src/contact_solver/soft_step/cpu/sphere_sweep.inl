@@ -2,62 +2,12 @@
 /// sphere_row.hpp, operation by operation.
 #include "src/base/prefetch.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
+#include "src/contact_solver/soft_step/cpu/sweep_lanes.inl"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
 namespace {
-
-template <class S>
-struct Vec3Lanes {
-  using Vec = typename S::Vec;
-  Vec x, y, z;
-
-  Vec3Lanes operator+(const Vec3Lanes& o) const { return {x + o.x, y + o.y, z + o.z}; }
-  Vec3Lanes operator-(const Vec3Lanes& o) const { return {x - o.x, y - o.y, z - o.z}; }
-  Vec3Lanes operator*(Vec k) const { return {x * k, y * k, z * k}; }
-  static Vec dot(const Vec3Lanes& a, const Vec3Lanes& b) {
-    return (a.x * b.x + a.y * b.y) + a.z * b.z;
-  }
-  static Vec3Lanes cross(const Vec3Lanes& a, const Vec3Lanes& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-  }
-  static Vec3Lanes select(typename S::Mask mask, const Vec3Lanes& a, const Vec3Lanes& b) {
-    return {S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z)};
-  }
-};
-
-/// Four numbers of each lane: a vector and a scalar.
-template <class S>
-struct QuadLanes {
-  Vec3Lanes<S> vector;
-  typename S::Vec scalar;
-
-  static QuadLanes load(const Real* base, const std::uint32_t* items, std::size_t quad) {
-    typename S::Vec columns[4];
-    S::load_quads(base + quad, items, columns);
-    return {{columns[0], columns[1], columns[2]}, columns[3]};
-  }
-  /// Stores the lanes whose bits are set.
-  void store(Real* base, const std::uint32_t* items, std::size_t quad, unsigned lanes) const {
-    const typename S::Vec columns[4] = {vector.x, vector.y, vector.z, scalar};
-    S::store_quads(base + quad, items, columns, lanes);
-  }
-};
-
-template <class S>
-struct BodyLanes {
-  QuadLanes<S> velocity, angular_velocity;
-
-  BodyLanes(const SphereSweep& sweep, const std::uint32_t* bodies)
-      : velocity(QuadLanes<S>::load(sweep.bodies, bodies, solver_body_quad::kVelocity)),
-        angular_velocity(
-            QuadLanes<S>::load(sweep.bodies, bodies, solver_body_quad::kAngularVelocity)) {}
-  void store(const SphereSweep& sweep, const std::uint32_t* bodies, unsigned lanes) const {
-    velocity.store(sweep.bodies, bodies, solver_body_quad::kVelocity, lanes);
-    angular_velocity.store(sweep.bodies, bodies, solver_body_quad::kAngularVelocity, lanes);
-  }
-};
 
 /// The bodies of a row. @param k number of the row
 struct RowBodies {
@@ -93,11 +43,11 @@ class RowLanes {
   void warm_start() const {
     const Quads impulses = quad(sphere_row_quad::kImpulses);
     const Quads normal = quad(sphere_row_quad::kNormal), arms = quad(sphere_row_quad::kFriction);
-    BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
+    BodyLanes<S> a(sweep_.bodies, a_), b(sweep_.bodies, b_);
     apply(normal.vector, arms.vector,
           normal.vector * S::absolute(impulses.scalar) + impulses.vector, impulses.vector, &a, &b);
-    a.store(sweep_, a_, used_);
-    b.store(sweep_, b_, used_);
+    a.store(sweep_.bodies, a_, used_);
+    b.store(sweep_.bodies, b_, used_);
   }
 
   /// @returns one bit per lane: whether the bodies may rebound. These rows are skipped.
@@ -110,11 +60,12 @@ class RowLanes {
     const Vectors& normal = normal_distance.vector;
     const Vec friction_coefficient = friction_arms.vector.x, normal_mass = friction_arms.scalar;
     const Vec arm_a = friction_arms.vector.y, arm_b = friction_arms.vector.z;
-    const Vec tangent_mass = S::load_column(sweep_.rows + sphere_row_quad::kTangentMass, rows_);
+    const Vec tangent_mass =
+        S::load_column(sweep_.rows + sphere_row_quad::kTangentMass, kSweepStride, rows_);
     const Vec impulse_before = S::absolute(impulses.scalar);
-    BodyLanes<S> a(sweep_, a_), b(sweep_, b_);
-    Quads shift_a = Quads::load(sweep_.bodies, a_, solver_body_quad::kShift);
-    Quads shift_b = Quads::load(sweep_.bodies, b_, solver_body_quad::kShift);
+    BodyLanes<S> a(sweep_.bodies, a_), b(sweep_.bodies, b_);
+    Quads shift_a = Quads::load(sweep_.bodies + solver_body_quad::kShift, kSweepStride, a_);
+    Quads shift_b = Quads::load(sweep_.bodies + solver_body_quad::kShift, kSweepStride, b_);
 
     const Vec separation =
         normal_distance.scalar + Vectors::dot(shift_a.vector - shift_b.vector, normal);
@@ -171,23 +122,25 @@ class RowLanes {
     impulses = {friction, S::select(pushes, wanted, S::zero_with_sign_of(impulses.scalar))};
     apply(normal, friction_arms.vector, normal * along + tangential, tangential, &a, &b);
 
-    impulses.store(sweep_.rows, rows_, sphere_row_quad::kImpulses, lanes);
-    a.store(sweep_, a_, lanes);
-    b.store(sweep_, b_, lanes);
+    impulses.store(sweep_.rows + sphere_row_quad::kImpulses, kSweepStride, rows_, lanes);
+    a.store(sweep_.bodies, a_, lanes);
+    b.store(sweep_.bodies, b_, lanes);
     if constexpr (kUseBias) {
       const unsigned projects = lanes & S::bits(S::less(zero, projection));
       if (projects == 0) return may_rebound;
       const Vectors impulse = normal * (projection * normal_mass);
       shift_a.vector = shift_a.vector + impulse * a.velocity.scalar;
       shift_b.vector = shift_b.vector - impulse * b.velocity.scalar;
-      shift_a.store(sweep_.bodies, a_, solver_body_quad::kShift, projects);
-      shift_b.store(sweep_.bodies, b_, solver_body_quad::kShift, projects);
+      shift_a.store(sweep_.bodies + solver_body_quad::kShift, kSweepStride, a_, projects);
+      shift_b.store(sweep_.bodies + solver_body_quad::kShift, kSweepStride, b_, projects);
     }
     return may_rebound;
   }
 
  private:
-  Quads quad(std::size_t offset) const { return Quads::load(sweep_.rows, rows_, offset); }
+  Quads quad(std::size_t offset) const {
+    return Quads::load(sweep_.rows + offset, kSweepStride, rows_);
+  }
 
   /// @param arms in y and z
   static void apply(const Vectors& normal, const Vectors& arms, const Vectors& impulse,

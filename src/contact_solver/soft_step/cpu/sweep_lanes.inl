@@ -1,0 +1,71 @@
+/// Vectors of several rows and bodies for the kernels of the sweeps, for any instruction set.
+#pragma once
+
+#include "src/contact_solver/soft_step/cpu/sweep_layout.hpp"
+
+#include <cstddef>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+namespace {
+
+template <class S>
+struct Vec3Lanes {
+  using Vec = typename S::Vec;
+  Vec x, y, z;
+
+  Vec3Lanes operator+(const Vec3Lanes& o) const { return {x + o.x, y + o.y, z + o.z}; }
+  Vec3Lanes operator-(const Vec3Lanes& o) const { return {x - o.x, y - o.y, z - o.z}; }
+  Vec3Lanes operator*(Vec k) const { return {x * k, y * k, z * k}; }
+  static Vec dot(const Vec3Lanes& a, const Vec3Lanes& b) {
+    return (a.x * b.x + a.y * b.y) + a.z * b.z;
+  }
+  static Vec3Lanes cross(const Vec3Lanes& a, const Vec3Lanes& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  }
+  static Vec3Lanes select(typename S::Mask mask, const Vec3Lanes& a, const Vec3Lanes& b) {
+    return {S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z)};
+  }
+};
+
+/// Four numbers of each lane: a vector and a scalar.
+template <class S>
+struct QuadLanes {
+  Vec3Lanes<S> vector;
+  typename S::Vec scalar;
+
+  /// @param base   first quadruple of item 0
+  /// @param stride Reals per item
+  static QuadLanes load(const Real* base, std::size_t stride, const std::uint32_t* items) {
+    typename S::Vec columns[4];
+    S::load_quads(base, stride, items, columns);
+    return {{columns[0], columns[1], columns[2]}, columns[3]};
+  }
+  /// Stores the lanes whose bits are set.
+  void store(Real* base, std::size_t stride, const std::uint32_t* items, unsigned lanes) const {
+    const typename S::Vec columns[4] = {vector.x, vector.y, vector.z, scalar};
+    S::store_quads(base, stride, items, columns, lanes);
+  }
+};
+
+/// Velocities of the bodies of each lane.
+template <class S>
+struct BodyLanes {
+  QuadLanes<S> velocity, angular_velocity;
+
+  BodyLanes(const Real* all, const std::uint32_t* bodies)
+      : velocity(QuadLanes<S>::load(all + solver_body_quad::kVelocity, kSweepStride, bodies)),
+        angular_velocity(
+            QuadLanes<S>::load(all + solver_body_quad::kAngularVelocity, kSweepStride, bodies)) {}
+  void store(Real* all, const std::uint32_t* bodies, unsigned lanes) const {
+    velocity.store(all + solver_body_quad::kVelocity, kSweepStride, bodies, lanes);
+    angular_velocity.store(all + solver_body_quad::kAngularVelocity, kSweepStride, bodies, lanes);
+  }
+};
+
+}  // namespace
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,33 @@
+/// Layout of the data that the kernels of the sweeps share.
+#pragma once
+
+// The includes are restricted; see src/sphere_collider/cpu/kernels.hpp for the reason. Rows and
+// bodies are therefore arrays of Reals; soft_step_solver.cpp checks their layout.
+#include <jfpx/config.hpp>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cpu {
+
+/// Reals per SphereRow, per SolverBody and per PointRow.
+inline constexpr std::size_t kSweepStride = 16;
+
+/// Quadruples of Reals in a SolverBody.
+namespace solver_body_quad {
+inline constexpr std::size_t kVelocity = 0;         ///< velocity, inverse mass
+inline constexpr std::size_t kAngularVelocity = 4;  ///< angular velocity, inverse inertia
+inline constexpr std::size_t kShift = 8;            ///< shift, unused
+inline constexpr std::size_t kRotation = 12;        ///< rotation, unused
+}  // namespace solver_body_quad
+
+/// Copy of soft_step::Softness.
+struct SweepSoftness {
+  Real bias_rate, mass_scale, impulse_scale;
+};
+
+}  // namespace cpu
+}  // namespace JFPX_ABI
+}  // namespace jfpx
