@@ -201,6 +201,36 @@ TEST_P(DeviceWorldTest, ManyBodiesHaveTheBitsOfTheProcessor) {
   }
 }
 
+// Steps without manifolds do not integrate the rotation of bodies on a device.
+TEST_P(DeviceWorldTest, SpinningBodiesFallAsleepInTheSameStep) {
+  Scene scene;
+  scene.bodies = {test::half_space({0, 1, 0}, 0)};
+  for (int k = 0; k < 24; ++k) {
+    BodyDef def;
+    def.position = {static_cast<Real>(2 * k), 0.5_r, 0};
+    def.shape = Sphere{0.5_r};
+    if (k % 4 == 3) {  // a box that touches nothing
+      def.shape = Box{{0.5_r, 0.4_r, 0.3_r}};
+      def.position.y = 5;
+      def.acceleration = {};
+    }
+    def.angular_velocity = Vec3{0, 0.2_r * static_cast<Real>(k), 0};
+    scene.bodies.push_back(def);
+  }
+  World host = on_host(scene), device = on_device(scene);
+  std::uint32_t most = 0, least = 24;
+  for (int n = 0; n < 90; ++n) {
+    const StepReport report = host.step();
+    ASSERT_EQ(device.step().awake, report.awake) << n;
+    ASSERT_EQ(device.state_hash(), host.state_hash()) << n;
+    most = std::max(most, report.awake);
+    least = std::min(least, report.awake);
+  }
+  EXPECT_EQ(most, 24u);
+  EXPECT_GT(least, 0u);
+  EXPECT_LT(least, 24u);
+}
+
 TEST_P(DeviceWorldTest, ABodyWithMoreContactsThanColors) {
   Scene scene;
   BodyDef giant = test::ball({0, 0, 0}, 5, 100);

@@ -51,8 +51,8 @@ constexpr Pin kSoftStepPins[] = {
     {"overlap", 32, 60, 0x1aa5330e3d17bbf6u, 0xe54219b9024930d0u},
     {"lattice", 125, 30, 0xc1b4bc0d5892cdceu, 0xfdde9b1863a93df8u},
     {"polydisperse", 100, 60, 0xd62f77d75c6f7d7eu, 0x367a150899394731u},
-    {"mixed", 40, 150, 0x2547f74b439317c8u, 0xa8f326a06f95810cu},
-    {"capsules", 20, 200, 0xcfcabd432b860506u, 0x1ed70d9c23782c32u},
+    {"mixed", 40, 150, 0x48b7fa58e62d9457u, 0x7c50a4c7f0e4e2e3u},
+    {"capsules", 20, 200, 0xf850f72371f8bf3bu, 0xfd0063eb7708ddedu},
     {"bridge", 30, 200, 0x0fa9033331da8651u, 0xbab82dbf31cf057fu},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},

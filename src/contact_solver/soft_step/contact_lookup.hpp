@@ -40,7 +40,7 @@ class ContactLookup {
 
   /// @param index receives the index of the contact
   bool find(const ContactKey& key, std::uint32_t* index) {
-    if (is_first_ || (next_ > 0 && key < sorted_[next_ - 1].key)) {
+    if (is_first_ || (next_ > 0 && key <= sorted_[next_ - 1].key)) {
       is_first_ = false;
       const auto found = std::ranges::lower_bound(sorted_, key, {}, &Contact::key);
       next_ = static_cast<std::size_t>(found - sorted_.begin());

@@ -229,9 +229,12 @@ JFPX_HD inline void solve_friction(ManifoldRow* row, Real pressure, const BodyPa
 template <bool kFixed>
 JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, const BodyPair& pair,
                                   const StepConstants& step, bool use_bias) {
-  const Vec3& n = row.normal;
-  for (std::uint32_t i = 0; i < row.count; ++i) {
-    PointRow& p = points[i];
+  const Vec3 n = row.normal;
+  const std::uint32_t count = row.count;
+  PointRow next = points[0];
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const PointRow p = next;
+    if (i + 1 < count) next = points[i + 1];  // so that a device does not wait for the point
     const Real moved = dot(pair.a->shift - pair.b->shift, n) +
                        (dot(p.turn_a, pair.a->rotation) - dot(p.turn_b, pair.b->rotation));
     const Real separation = p.distance + moved;
@@ -243,8 +246,8 @@ JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, cons
     const Real wanted = p.normal_impulse + change;
     const Real normal_impulse = wanted > 0 ? wanted : Real(0);
     const Real along = normal_impulse - p.normal_impulse;
-    p.normal_impulse = normal_impulse;
-    if (normal_impulse > 0 && !has_pushed(p)) p.rebound = -p.rebound;
+    points[i].normal_impulse = normal_impulse;
+    if (normal_impulse > 0 && !has_pushed(p)) points[i].rebound = -p.rebound;
     apply<kFixed>(pair, n * along, p.spin_a * along, p.spin_b * along);
     if (bias.projection > 0) project<kFixed>(pair, p, n, bias.projection * p.normal_mass);
   }
@@ -267,15 +270,18 @@ JFPX_HD inline void solve_tangents(ManifoldRow* row, const PointRow* points, con
 }
 
 /// Number of iterations over the points of a row in a sweep. The points are coupled, so a second
-/// iteration nearly solves them together.
-JFPX_HD inline int iterations_of(const ManifoldRow& row) { return row.count > 1 ? 2 : 1; }
+/// iteration of a relax sweep nearly solves them together. A second iteration of a bias sweep would
+/// let columns of boxes sway without end.
+JFPX_HD inline int iterations_of(const ManifoldRow& row, bool use_bias) {
+  return row.count > 1 && !use_bias ? 2 : 1;
+}
 
 /// The iterations of a sweep. The bias sweep does not solve friction, which would couple the
 /// push-out to the tangents: pyramids of boxes would keep oscillating.
 template <bool kFixed>
 JFPX_HD inline void solve(ManifoldRow* row, PointRow* points, const BodyPair& pair,
                           const StepConstants& step, bool use_bias) {
-  for (int i = 0; i < iterations_of(*row); ++i) {
+  for (int i = 0; i < iterations_of(*row, use_bias); ++i) {
     solve_normals<kFixed>(*row, points, pair, step, use_bias);
     if (!use_bias) solve_tangents<kFixed>(row, points, pair);
   }

@@ -256,7 +256,8 @@ struct RowSetup {
     if (contacts.rolling_impulses != nullptr) {
       contacts.rolling_impulses[contact] = row.rolling_impulse * side;
     }
-    // The points share the friction, so that their sum and their torque are those of the row.
+    // The points share the friction. Their sum is that of the row, and so is their torque about the
+    // normal if the points are in a plane with this normal.
     const FrictionPoints from(*this, row, contact);
     Vec3 centre;
     for (std::uint32_t i = 0; i < row.count; ++i) centre += from.arms(i).a * from.share(i);

@@ -43,7 +43,8 @@ struct StepConstants {
   /// all in chains of overlapping bodies, which would fly apart at a higher speed.
   Real max_bias_velocity = 0;
   Real restitution_threshold = 0;  ///< [m/s], slower contacts do not bounce
-  /// [1/m], > 0: points with a gap of more than its reciprocal do not support friction
+  /// [1/m], > 0: points with a gap of more than its reciprocal hardly count in the centre of
+  /// friction
   Real inverse_friction_gap = 0;
 };
 

@@ -113,7 +113,7 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
 /// Motion of a body in a step.
 struct StepMotion {
   Vec3 shift;            ///< [m], of the centre of mass
-  Vec3 rotation;         ///< [rad], to first order
+  Real turn = 0;         ///< [rad], angle of the rotation, to first order
   Vec3 velocity_change;  ///< [m/s]
 };
 
@@ -164,7 +164,7 @@ struct MotionPointers : MotionColumns<PointerColumn> {
     constexpr Real kDriven = Real(0.04), kRotationOfSphere = Real(0.04);
     const Real limit = (is_driven ? bodies.sleep_speed * kDriven : bodies.sleep_speed) * bodies.dt;
     const Real weight = bodies.radius[i] > 0 ? kRotationOfSphere : Real(1);
-    const Real spin = length(motion.rotation) * bodies.extent[i] * weight;
+    const Real spin = motion.turn * bodies.extent[i] * weight;
     const Real linear = length(motion.shift);
     const Real distance = linear < spin ? spin : linear;
     const bool is_slow = bodies.can_sleep[i] != 0 && distance <= limit &&

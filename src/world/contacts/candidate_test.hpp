@@ -23,13 +23,13 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
   found->key = {pair.a, pair.b, bounds.sub_shapes.part(pair.sub_shape_a),
                 bounds.sub_shapes.part(pair.sub_shape_b)};
   found->clear();
-  found->tested = {};
   const bool is_recyclable = bounds.sub_shapes.is_polyhedron(pair.sub_shape_a) &&
                              bounds.sub_shapes.is_polyhedron(pair.sub_shape_b);
   if (is_recyclable) {
     const soft_step::ManifoldInput* last = find_last(found->key);
     if (last != nullptr && recycle(bounds, pair, *last, last_points, found)) return;
   }
+  found->tested = {};
   const Vec3 motion = bodies.predicted_motion(pair.a) - bodies.predicted_motion(pair.b);
   const Vec3& centre = bodies.position[pair.a];
   const Real margin = bounds.margin_of(pair);

@@ -337,7 +337,8 @@ struct BlockSolveProgram : RowSolver<kKinds> {
         if constexpr (kIsSphere) {
           setup.store(row, nullptr, inner.contact, 1);  // both bodies are movable
         } else {
-          row.a = setup.key(inner.contact).a;
+          const soft_step::ContactKey key = setup.key(inner.contact);
+          row.a = key.a, row.b = key.b;
           setup.store(row, d.parts_of(row), inner.contact);
         }
       }

@@ -218,11 +218,12 @@ struct RowSolver {
 
   template <class Row, class Operation>
   JFPX_HD void solve_other(const Sweep& sweep, const Operation& operation, RowItem* item) const {
-    Row row = data.rows<Row>()[item->row - sweep.first<Row>()];
+    // Changed in place: a copy would be on the stack of the thread.
+    Row& row = data.rows<Row>()[item->row - sweep.first<Row>()];
     const Mat3* inertia = data.step.bodies.inverse_inertia;
-    const Mat3 inertia_a = inertia[item->a.index], inertia_b = inertia[item->b.index];
-    auto context = context_of(
-        row, soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia_a, &inertia_b});
+    auto context =
+        context_of(row, soft_step::BodyPair{&item->a.motion, &item->b.motion,
+                                            &inertia[item->a.index], &inertia[item->b.index]});
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
       orientation_a = data.orientation_cells[item->a.index].load(sweep.moves());
@@ -327,11 +328,10 @@ struct RowSolver {
   template <class Row, class Operation>
   JFPX_HD void solve_fixed_other(const Sweep& sweep, const Operation& operation, std::uint32_t r,
                                  ItemBody* item) const {
-    Row row = data.rows<Row>()[r - sweep.first<Row>()];
+    Row& row = data.rows<Row>()[r - sweep.first<Row>()];
     SolverBody fixed;
-    const Mat3 inertia = data.step.bodies.inverse_inertia[row.a];
-    const Mat3 none;
-    auto context = context_of(row, soft_step::BodyPair{&item->motion, &fixed, &inertia, &none});
+    const Mat3* inertia = data.step.bodies.inverse_inertia + row.a;
+    auto context = context_of(row, soft_step::BodyPair{&item->motion, &fixed, inertia, nullptr});
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
       orientation_a = data.step.orientation[row.a];
@@ -367,7 +367,6 @@ struct RowSolver {
   template <class Operation, class Row>
   JFPX_HD void store(const Sweep& sweep, const Row& row, std::uint32_t r) const {
     if constexpr (Operation::kChangesRow) {
-      store_changes(row, &data.rows<Row>()[r - sweep.first<Row>()]);
       if (sweep.stores_impulses) {
         data.row_setup().store(row, data.parts_of(row), data.row_contact[r]);
       }

@@ -154,14 +154,24 @@ void write_tests(BinaryWriter* writer, const ContactSet& set) {
 }
 
 void read_tests(BinaryReader* reader, ContactSet* set) {
+  const auto is_unit = [](Real length2) {
+    return absolute(length2 - 1) < Real(0.01);  // false for NaN
+  };
   for (ManifoldInput& manifold : set->manifolds) {
     if (!reader->get<bool>()) continue;
-    (*reader)(manifold.tested);
-    BinaryReader::require(manifold.tested.are_set() && manifold.count <= kMostPoints,
-                          "a contact cannot be recycled");
+    soft_step::TestedPoses& tested = manifold.tested;
+    (*reader)(tested);
+    bool is_valid = manifold.count > 0 && manifold.count <= kMostPoints &&
+                    is_unit(length_squared(manifold.normal)) &&
+                    is_unit(length_squared(tested.orientation_a)) &&
+                    is_unit(length_squared(tested.orientation_b)) && is_finite(tested.offset);
     for (std::uint32_t p = manifold.first; p < manifold.first + manifold.count; ++p) {
-      (*reader)(set->points[p].arm_b, set->points[p].tested_distance);
+      PointInput& point = set->points[p];
+      (*reader)(point.arm_b, point.tested_distance);
+      is_valid &= is_finite(point.arm_a) && is_finite(point.arm_b);
+      is_valid &= is_finite(point.tested_distance);
     }
+    BinaryReader::require(is_valid, "a contact has no valid test");
   }
 }
 

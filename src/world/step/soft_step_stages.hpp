@@ -132,12 +132,22 @@ struct StepBodies {
             solver[i].angular_velocity};
   }
 
+  /// [rad], angle of the rotation of a body in the step, to first order. Not SolverBody::rotation,
+  /// which a device leaves out in steps without manifolds.
+  JFPX_HD Real turn_of_step(std::uint32_t i) const {
+    constexpr Real kFast = 1;  // [rad]; a difference of orientations shows no whole turns
+    const Real turn = length(solver[i].angular_velocity) * bodies.dt;
+    if (turn > kFast) return turn;
+    const Quat change = orientation[i] * conjugate(bodies.orientation[i]);
+    return 2 * length(Vec3{change.x, change.y, change.z});
+  }
+
   /// Ends the step. @returns whether the body has been slow for long enough to sleep
   JFPX_HD bool store(std::uint32_t i) const {
     bool rests = false;
     if (bodies.awake[i] != 0) {
       const SolverBody& body = solver[i];
-      const StepMotion moved{body.shift, body.rotation, body.velocity - bodies.velocity[i]};
+      const StepMotion moved{body.shift, turn_of_step(i), body.velocity - bodies.velocity[i]};
       motion.end_step(bodies, i, state(i));
       if (bodies.movable(i)) {
         const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{});

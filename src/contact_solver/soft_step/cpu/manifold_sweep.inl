@@ -85,7 +85,7 @@ class ManifoldLanes {
     FrictionLanes friction;
     if constexpr (!kUseBias) friction = FrictionLanes(*this);
 
-    const unsigned iterations = most_ > 1 ? 2 : 1;
+    const unsigned iterations = most_ > 1 && !kUseBias ? 2 : 1;
     for (unsigned k = 0; k < iterations; ++k) {
       const Mask iterates = k == 0 ? S::always() : S::less(S::set(1), counts_);
       for (unsigned i = 0; i < most_; ++i) {
