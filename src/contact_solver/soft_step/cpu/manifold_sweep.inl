@@ -181,18 +181,19 @@ class ManifoldLanes {
     Vec xx, xy, slip_mass;
 
     FrictionLanes() = default;
-    explicit FrictionLanes(const ManifoldLanes& row) {
-      namespace offset = manifold_row_offset;
-      tangent = row.quad(offset::kTangent);
-      bitangent = row.quad(offset::kBitangent);
-      x.load(row, offset::kLeverX);
-      y.load(row, offset::kLeverY);
-      const Quads q0 = row.quad(offset::kTwist), q1 = row.quad(offset::kTwist + 4);
+    explicit FrictionLanes(const ManifoldLanes& row)
+        : tangent(row.quad(manifold_row_offset::kTangent)),
+          bitangent(row.quad(manifold_row_offset::kBitangent)),
+          impulses(row.quad(manifold_row_offset::kFrictionImpulses)),
+          slip_mass(S::load_column(row.sweep_.rows + manifold_row_offset::kRolling,
+                                   manifold_row_offset::kStride, row.rows_)) {
+      x.load(row, manifold_row_offset::kLeverX);
+      y.load(row, manifold_row_offset::kLeverY);
+      const Quads q0 = row.quad(manifold_row_offset::kTwist);
+      const Quads q1 = row.quad(manifold_row_offset::kTwist + 4);
       twist_a = q0.vector;
       twist_b = {q0.scalar, q1.vector.x, q1.vector.y};
       xx = q1.vector.z, xy = q1.scalar;
-      impulses = row.quad(offset::kFrictionImpulses);
-      slip_mass = S::load_column(row.sweep_.rows + offset::kRolling, offset::kStride, row.rows_);
     }
 
     /// @param change x, y, twist
