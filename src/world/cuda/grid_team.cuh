@@ -161,7 +161,11 @@ class GridTeam {
   [[gnu::always_inline]] JFPX_HD void run_dataflow(std::uint32_t n,
                                                    const Dataflow& dataflow) const {
 #if defined(__CUDA_ARCH__)
-    for (std::uint32_t i = first(); i - lane_id() < n; i += blocks_ * kThreads) {
+    // Consecutive warps are in different blocks, so that a few items use several multiprocessors.
+    constexpr std::uint32_t kLanes = 32;
+    const std::uint32_t warp = threadIdx.x / kLanes * blocks_ + block_;
+    const std::uint32_t start = warp * kLanes + lane_id();
+    for (std::uint32_t i = start; i - lane_id() < n; i += blocks_ * kThreads) {
       typename Dataflow::Item item;
       if (i < n) dataflow.begin(i, &item);
       // All lanes wait together: one after the other, they would take 32 times as long.

@@ -435,6 +435,8 @@ class DeviceStep final : public DeviceWorld {
     mark(2);
     device_->run(PrepareProgram{d}, contacts);
     const bool has_joints = d.world_joints.count > 0;
+    // More threads than rows: rows of manifolds need the caches of several multiprocessors.
+    const std::size_t rows = std::max<std::size_t>(contacts, 4 * std::size_t{last.manifolds});
     if (d.step.bodies.has_blocks) {
       if (has_joints) {
         device_->run(BlockSolveProgram<soft_step::kRowKinds>{d}, contacts);
@@ -443,9 +445,9 @@ class DeviceStep final : public DeviceWorld {
         device_->run(BlockSolveProgram<soft_step::kContactRowKinds>{d}, contacts);
       }
     } else if (has_joints) {
-      device_->run(SolveProgram<soft_step::kRowKinds>{d}, contacts);
+      device_->run(SolveProgram<soft_step::kRowKinds>{d}, rows);
     } else {
-      device_->run(SolveProgram<soft_step::kContactRowKinds>{d}, contacts);
+      device_->run(SolveProgram<soft_step::kContactRowKinds>{d}, rows);
     }
     device_->run(CommitProgram{d}, contacts);
     mark(3);
