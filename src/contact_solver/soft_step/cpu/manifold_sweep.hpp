@@ -22,6 +22,9 @@ inline constexpr std::size_t kRolling = kNormal + 48;  ///< slip mass, rolling a
 inline constexpr std::size_t kStride = sizeof(Real) == 4 ? 60 : 56;
 }  // namespace manifold_row_offset
 
+/// Largest number of points of a row.
+inline constexpr unsigned kMostPoints = 8;
+
 /// Quadruples of Reals in a PointRow.
 namespace point_row_quad {
 inline constexpr std::size_t kTurnA = 0;   ///< turn a, distance
@@ -36,8 +39,7 @@ struct ManifoldSweep {
   Real* rows;    ///< ManifoldRow
   Real* points;  ///< PointRow
   Real* bodies;  ///< SolverBody
-  // Copies of members of StepConstants.
-  Real h, inverse_h, push_out_speed, max_bias_velocity;
+  SweepConstants constants;
   SweepSoftness softness;
 };
 

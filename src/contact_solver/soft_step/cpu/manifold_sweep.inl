@@ -1,6 +1,5 @@
 /// Kernels for rows of manifolds, for any instruction set. The arithmetic is that of
 /// manifold_row.hpp, operation by operation.
-#include "src/base/prefetch.hpp"
 #include "src/contact_solver/soft_step/cpu/manifold_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/sweep_lanes.inl"
 
@@ -124,7 +123,7 @@ class ManifoldLanes {
   }
 
  private:
-  static constexpr unsigned kMostPoints = 8, kAll = (1u << kLanes) - 1;
+  static constexpr unsigned kAll = (1u << kLanes) - 1;
 
   /// Point i of each row.
   struct PointLanes {
@@ -168,8 +167,9 @@ class ManifoldLanes {
       spin_b = {q2.vector.y, q2.vector.z, q2.scalar};
     }
     Vec speed(const ManifoldLanes& row, const Vectors& u) const {
-      return Vectors::dot(row.velocity_a_.vector - row.velocity_b_.vector, u) +
-             (Vectors::dot(turn_a, row.spin_a_.vector) - Vectors::dot(turn_b, row.spin_b_.vector));
+      return Vectors::dot(row.body_a_.velocity.vector - row.body_b_.velocity.vector, u) +
+             (Vectors::dot(turn_a, row.body_a_.angular_velocity.vector) -
+              Vectors::dot(turn_b, row.body_b_.angular_velocity.vector));
     }
   };
 
@@ -219,7 +219,9 @@ class ManifoldLanes {
         fx = S::select(slides, S::select(exceeds, sx * k, sx), fx);
         fy = S::select(slides, S::select(exceeds, sy * k, sy), fy);
       }
-      const Vec spin = Vectors::dot(row->spin_a_.vector - row->spin_b_.vector, normal.vector);
+      const Vec spin =
+          Vectors::dot(row->body_a_.angular_velocity.vector - row->body_b_.angular_velocity.vector,
+                       normal.vector);
       const Vec twist_limit = limit * tangent.scalar;
       const Vec wanted = before.z - bitangent.scalar * spin;
       const Vec twist = S::select(
@@ -249,26 +251,14 @@ class ManifoldLanes {
       active = S::both(active, S::negate_mask(is_idle));
     }
     if (!S::any(active)) return 0;
-    Vec bias_velocity = separation * S::set(sweep_.inverse_h), mass_scale = S::set(1);
-    Vec impulse_scale = zero, projection = zero;
-    if constexpr (kUseBias) {
-      const Vec push_out_speed = S::set(sweep_.push_out_speed);
-      const Vec max_bias_velocity = S::set(sweep_.max_bias_velocity);
-      const Vec wanted = S::set(-sweep_.softness.bias_rate) * separation;
-      const Vec push = S::select(S::less(wanted, push_out_speed), wanted, push_out_speed);
-      const Vec speed = S::select(S::less(push, max_bias_velocity), push, max_bias_velocity);
-      bias_velocity = S::select(is_apart, bias_velocity, S::negate(speed));
-      mass_scale = S::select(is_apart, mass_scale, S::set(sweep_.softness.mass_scale));
-      impulse_scale = S::select(is_apart, zero, S::set(sweep_.softness.impulse_scale));
-      projection = S::select(is_apart, zero, (push - speed) * S::set(sweep_.h));
-    } else {
-      bias_velocity = S::select(is_apart, bias_velocity, zero);
-    }
-    const Vec closing =
-        Vectors::dot(velocity_a_.vector - velocity_b_.vector, normal) +
-        (Vectors::dot(p.turn_a, spin_a_.vector) - Vectors::dot(p.turn_b, spin_b_.vector));
-    const Vec change =
-        S::negate(p.mass * mass_scale) * (closing + bias_velocity) - impulse_scale * p.impulse;
+    const auto bias = BiasLanes<S>::template of<kUseBias>(
+        sweep_.constants, separation, is_apart,
+        [this](Real SweepSoftness::*member) { return S::set(sweep_.softness.*member); });
+    const Vec closing = Vectors::dot(body_a_.velocity.vector - body_b_.velocity.vector, normal) +
+                        (Vectors::dot(p.turn_a, body_a_.angular_velocity.vector) -
+                         Vectors::dot(p.turn_b, body_b_.angular_velocity.vector));
+    const Vec change = S::negate(p.mass * bias.mass_scale) * (closing + bias.velocity) -
+                       bias.impulse_scale * p.impulse;
     const Vec wanted = p.impulse + change;
     const Mask pushes = S::less(zero, wanted);
     const Vec impulse = S::select(pushes, wanted, zero);
@@ -277,15 +267,15 @@ class ManifoldLanes {
     p.rebound = S::select(S::both(active, pushes), S::absolute(p.rebound), p.rebound);
     apply(active, normal * along, p.spin_a * along, p.spin_b * along);
     if constexpr (kUseBias) {
-      const Mask projects = S::both(active, S::less(zero, projection));
+      const Mask projects = S::both(active, S::less(zero, bias.projection));
       const unsigned bits = S::bits(projects);
       if (bits == 0) return 0;
-      const Vec size = projection * p.mass;
+      const Vec size = bias.projection * p.mass;
       const Vectors push = normal * size;
-      *shift_a = Vectors::select(projects, *shift_a + push * velocity_a_.scalar, *shift_a);
+      *shift_a = Vectors::select(projects, *shift_a + push * body_a_.velocity.scalar, *shift_a);
       *rotation_a = Vectors::select(projects, *rotation_a + p.spin_a * size, *rotation_a);
       if constexpr (!kFixed) {
-        *shift_b = Vectors::select(projects, *shift_b - push * velocity_b_.scalar, *shift_b);
+        *shift_b = Vectors::select(projects, *shift_b - push * body_b_.velocity.scalar, *shift_b);
         *rotation_b = Vectors::select(projects, *rotation_b - p.spin_b * size, *rotation_b);
       }
       return bits;
@@ -299,11 +289,11 @@ class ManifoldLanes {
     const auto change = [&](Vectors* value, const Vectors& to) {
       *value = is_of_all ? to : Vectors::select(mask, to, *value);
     };
-    change(&velocity_a_.vector, velocity_a_.vector + impulse * velocity_a_.scalar);
-    change(&spin_a_.vector, spin_a_.vector + spin_a);
+    change(&body_a_.velocity.vector, body_a_.velocity.vector + impulse * body_a_.velocity.scalar);
+    change(&body_a_.angular_velocity.vector, body_a_.angular_velocity.vector + spin_a);
     if constexpr (!kFixed) {
-      change(&velocity_b_.vector, velocity_b_.vector - impulse * velocity_b_.scalar);
-      change(&spin_b_.vector, spin_b_.vector - spin_b);
+      change(&body_b_.velocity.vector, body_b_.velocity.vector - impulse * body_b_.velocity.scalar);
+      change(&body_b_.angular_velocity.vector, body_b_.angular_velocity.vector - spin_b);
     }
   }
 
@@ -331,17 +321,12 @@ class ManifoldLanes {
     Quads{vector, S::set(0)}.store(sweep_.bodies + offset, kSweepStride, bodies, lanes);
   }
   void load_velocities() {
-    velocity_a_ = body_quad(a_, solver_body_quad::kVelocity);
-    spin_a_ = body_quad(a_, solver_body_quad::kAngularVelocity);
-    velocity_b_ = body_quad(b_, solver_body_quad::kVelocity);
-    spin_b_ = body_quad(b_, solver_body_quad::kAngularVelocity);
+    body_a_ = BodyLanes<S>(sweep_.bodies, a_);
+    body_b_ = BodyLanes<S>(sweep_.bodies, b_);
   }
   void store_velocities(unsigned lanes) const {
-    velocity_a_.store(sweep_.bodies + solver_body_quad::kVelocity, kSweepStride, a_, lanes);
-    spin_a_.store(sweep_.bodies + solver_body_quad::kAngularVelocity, kSweepStride, a_, lanes);
-    if constexpr (kFixed) return;
-    velocity_b_.store(sweep_.bodies + solver_body_quad::kVelocity, kSweepStride, b_, lanes);
-    spin_b_.store(sweep_.bodies + solver_body_quad::kAngularVelocity, kSweepStride, b_, lanes);
+    body_a_.store(sweep_.bodies, a_, lanes);
+    if constexpr (!kFixed) body_b_.store(sweep_.bodies, b_, lanes);
   }
 
   const ManifoldSweep& sweep_;
@@ -350,37 +335,31 @@ class ManifoldLanes {
   std::uint32_t rows_[kLanes], a_[kLanes], b_[kLanes];
   std::uint32_t first_[kLanes], last_[kLanes];  ///< points
   Vec counts_;                                  ///< numbers of points
-  Quads velocity_a_, spin_a_, velocity_b_, spin_b_;
+  BodyLanes<S> body_a_, body_b_;
 };
 
-/// Calls one(lanes) for all vectors of rows, of which the last may be incomplete. @returns as
-/// ManifoldSweepFunction
+/// Calls one(lanes) for all vectors of rows. @returns as ManifoldSweepFunction
 template <class S, bool kFixed, class One>
-std::size_t for_each_manifold_vector(const ManifoldSweep& sweep, std::size_t first,
-                                     std::size_t last, std::uint32_t* left, const One& one) {
-  std::size_t count = 0;
-  for (std::size_t i = first; i < last; i += S::kLanes) {
-    const std::size_t rows = last - i < S::kLanes ? last - i : S::kLanes;
-    ManifoldLanes<S, kFixed> lanes(sweep, i, static_cast<unsigned>(rows));
-    for (unsigned skipped = one(&lanes); skipped != 0; skipped &= skipped - 1) {
-      left[count++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(skipped));
-    }
-  }
-  return count;
+std::size_t for_each_vector(const ManifoldSweep& sweep, std::size_t first, std::size_t last,
+                            std::uint32_t* left, const One& one) {
+  return for_each_vector<S::kLanes>(first, last, left, [&](std::size_t i, unsigned rows) {
+    ManifoldLanes<S, kFixed> lanes(sweep, i, rows);
+    return one(&lanes);
+  });
 }
 
 template <class S, bool kFixed>
 std::size_t warm_start_manifolds(const ManifoldSweep& sweep, std::size_t first, std::size_t last,
                                  std::uint32_t* left) {
-  return for_each_manifold_vector<S, kFixed>(sweep, first, last, left,
-                                             [](auto* lanes) { return lanes->warm_start(); });
+  return for_each_vector<S, kFixed>(sweep, first, last, left,
+                                    [](auto* lanes) { return lanes->warm_start(); });
 }
 
 template <class S, bool kFixed, bool kUseBias>
 std::size_t solve_manifolds(const ManifoldSweep& sweep, std::size_t first, std::size_t last,
                             std::uint32_t* left) {
-  return for_each_manifold_vector<S, kFixed>(
-      sweep, first, last, left, [](auto* lanes) { return lanes->template solve<kUseBias>(); });
+  return for_each_vector<S, kFixed>(sweep, first, last, left,
+                                    [](auto* lanes) { return lanes->template solve<kUseBias>(); });
 }
 
 }  // namespace

@@ -73,6 +73,7 @@ static_assert(offsetof(ManifoldRow, yy) == (manifold::kFrictionImpulses + 3) * k
 static_assert(offsetof(ManifoldRow, slip_mass) == manifold::kRolling * kReal);
 static_assert(offsetof(ManifoldRow, rolling_friction) == (manifold::kRolling + 1) * kReal);
 static_assert(offsetof(ManifoldRow, spinning_friction) == (manifold::kRolling + 2) * kReal);
+static_assert(cpu::kMostPoints == detail::PairManifold::kMaxPoints);
 static_assert(sizeof(PointRow) == cpu::kSweepStride * kReal);
 static_assert(offsetof(PointRow, turn_a) == cpu::point_row_quad::kTurnA * kReal);
 static_assert(offsetof(PointRow, distance) == (cpu::point_row_quad::kTurnA + 3) * kReal);
@@ -92,6 +93,9 @@ bool has_avx2(SimdLevel level) {
 #endif
 }
 
+cpu::SweepConstants sweep_constants(const StepConstants& c) {
+  return {c.h, c.inverse_h, c.push_out_speed, c.max_bias_velocity};
+}
 cpu::SweepSoftness softness(const Softness& s) {
   return {s.bias_rate, s.mass_scale, s.impulse_scale};
 }
@@ -469,8 +473,10 @@ void SoftStepSolver::run_row(Rows<Row>* rows, std::size_t i, const Operation& op
 
 /// Solves rows in vectors. @returns the number of skipped rows, which are written to `left`
 template <class Row, bool kFixed>
-std::size_t SoftStepSolver::run_kernel(Sweep sweep, std::size_t first, std::size_t last,
-                                       std::uint32_t* left) {
+std::size_t SoftStepSolver::run_kernel([[maybe_unused]] Sweep sweep,
+                                       [[maybe_unused]] std::size_t first,
+                                       [[maybe_unused]] std::size_t last,
+                                       [[maybe_unused]] std::uint32_t* left) {
 #if defined(__x86_64__)
   if constexpr (std::is_same_v<Row, ManifoldRow>) {
     const auto kernel = function_of(cpu::kAvx2ManifoldSweep[kFixed ? 1 : 0], sweep);
@@ -581,11 +587,7 @@ cpu::ManifoldSweep SoftStepSolver::manifold_sweep(bool is_fixed) {
   const StepConstants& c = constants_;
   return {reinterpret_cast<Real*>(rows<ManifoldRow>().rows.data()),
           reinterpret_cast<Real*>(rows<ManifoldRow>().parts.data()),
-          reinterpret_cast<Real*>(bodies_.data()),
-          c.h,
-          c.inverse_h,
-          c.push_out_speed,
-          c.max_bias_velocity,
+          reinterpret_cast<Real*>(bodies_.data()), sweep_constants(c),
           softness(is_fixed ? c.fixed : c.movable)};
 }
 
@@ -593,10 +595,7 @@ cpu::SphereSweep SoftStepSolver::sphere_sweep() {
   const StepConstants& c = constants_;
   return {reinterpret_cast<Real*>(rows<SphereRow>().rows.data()),
           reinterpret_cast<Real*>(bodies_.data()),
-          c.h,
-          c.inverse_h,
-          c.push_out_speed,
-          c.max_bias_velocity,
+          sweep_constants(c),
           c.restitution_threshold,
           softness(c.balls),
           softness(c.deep_balls),

@@ -24,8 +24,8 @@ inline constexpr std::size_t kBodies = 14;  ///< the numbers of both bodies, 32 
 struct SphereSweep {
   Real* rows;    ///< SphereRow
   Real* bodies;  ///< SolverBody
-  // Copies of members of StepConstants.
-  Real h, inverse_h, push_out_speed, max_bias_velocity, restitution_threshold;
+  SweepConstants constants;
+  Real restitution_threshold;  ///< StepConstants::restitution_threshold
   SweepSoftness balls, deep_balls;
   Real deep_penetration;  ///< soft_step::kDeepPenetration
 };

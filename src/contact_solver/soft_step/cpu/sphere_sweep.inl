@@ -77,34 +77,21 @@ class RowLanes {
     const Vectors spin = a.angular_velocity.vector * arm_a + b.angular_velocity.vector * arm_b;
     const Vectors velocity = (a.velocity.vector - b.velocity.vector) - Vectors::cross(spin, normal);
     const Vec closing = Vectors::dot(velocity, normal);
-    const Vec left = S::set(kUseBias ? sweep_.h : Real(0));
+    const Vec left = S::set(kUseBias ? sweep_.constants.h : Real(0));
     const unsigned may_rebound = lanes &
                                  S::bits(S::less(closing, S::set(-sweep_.restitution_threshold))) &
                                  S::bits(S::less_equal(separation + closing * left, zero));
     lanes &= ~may_rebound;
     if (lanes == 0) return may_rebound;
 
-    Vec bias_velocity = separation * S::set(sweep_.inverse_h), mass_scale = S::set(1);
-    Vec impulse_scale = zero, projection = zero;
-    if constexpr (kUseBias) {
-      const Vec radius = S::select(S::less(arm_a, arm_b), arm_a, arm_b);
-      const typename S::Mask is_deep =
-          S::less(S::set(sweep_.deep_penetration) * radius, S::negate(separation));
-      const auto softness = [&](Real SweepSoftness::*member) {
-        return S::select(is_deep, S::set(sweep_.deep_balls.*member), S::set(sweep_.balls.*member));
-      };
-      const Vec push_out_speed = S::set(sweep_.push_out_speed);
-      const Vec max_bias_velocity = S::set(sweep_.max_bias_velocity);
-      const Vec wanted = S::negate(softness(&SweepSoftness::bias_rate)) * separation;
-      const Vec push = S::select(S::less(wanted, push_out_speed), wanted, push_out_speed);
-      const Vec speed = S::select(S::less(push, max_bias_velocity), push, max_bias_velocity);
-      bias_velocity = S::select(is_apart, bias_velocity, S::negate(speed));
-      mass_scale = S::select(is_apart, mass_scale, softness(&SweepSoftness::mass_scale));
-      impulse_scale = S::select(is_apart, zero, softness(&SweepSoftness::impulse_scale));
-      projection = S::select(is_apart, zero, (push - speed) * S::set(sweep_.h));
-    } else {
-      bias_velocity = S::select(is_apart, bias_velocity, zero);
-    }
+    const Vec radius = S::select(S::less(arm_a, arm_b), arm_a, arm_b);
+    const typename S::Mask is_deep =
+        S::less(S::set(sweep_.deep_penetration) * radius, S::negate(separation));
+    const auto bias = BiasLanes<S>::template of<kUseBias>(
+        sweep_.constants, separation, is_apart, [&](Real SweepSoftness::*member) {
+          return S::select(is_deep, S::set(sweep_.deep_balls.*member),
+                           S::set(sweep_.balls.*member));
+        });
 
     Vectors friction = impulses.vector - (velocity - normal * closing) * tangent_mass;
     const Vec limit = friction_coefficient * impulse_before;
@@ -114,8 +101,8 @@ class RowLanes {
       friction = Vectors::select(slides, friction * (limit / S::square_root(size2)), friction);
     }
     const Vectors tangential = friction - impulses.vector;
-    const Vec change = S::negate(normal_mass * mass_scale) * (closing + bias_velocity) -
-                       impulse_scale * impulse_before;
+    const Vec change = S::negate(normal_mass * bias.mass_scale) * (closing + bias.velocity) -
+                       bias.impulse_scale * impulse_before;
     const Vec wanted = impulse_before + change;
     const typename S::Mask pushes = S::less(zero, wanted);
     const Vec along = S::select(pushes, wanted, zero) - impulse_before;
@@ -126,9 +113,9 @@ class RowLanes {
     a.store(sweep_.bodies, a_, lanes);
     b.store(sweep_.bodies, b_, lanes);
     if constexpr (kUseBias) {
-      const unsigned projects = lanes & S::bits(S::less(zero, projection));
+      const unsigned projects = lanes & S::bits(S::less(zero, bias.projection));
       if (projects == 0) return may_rebound;
-      const Vectors impulse = normal * (projection * normal_mass);
+      const Vectors impulse = normal * (bias.projection * normal_mass);
       shift_a.vector = shift_a.vector + impulse * a.velocity.scalar;
       shift_b.vector = shift_b.vector - impulse * b.velocity.scalar;
       shift_a.store(sweep_.bodies + solver_body_quad::kShift, kSweepStride, a_, projects);
@@ -170,33 +157,23 @@ void prefetch_bodies(const SphereSweep& sweep, std::size_t first, std::size_t co
   }
 }
 
-/// Calls one(first, count) for all vectors of rows, of which the last may be incomplete. @returns
-/// as SphereSweepFunction
-template <unsigned kLanes, class One>
+/// Calls one(lanes) for all vectors of rows. @returns as SphereSweepFunction
+template <class S, class One>
 std::size_t for_each_vector(const SphereSweep& sweep, std::size_t first, std::size_t last,
                             std::uint32_t* left, const One& one) {
-  constexpr std::size_t kAhead = 2 * kLanes;  // some hundred nanoseconds
+  constexpr std::size_t kAhead = 2 * S::kLanes;  // some hundred nanoseconds
   prefetch_bodies(sweep, first, kAhead, last);
-  std::size_t count = 0;
-  const auto add = [&](std::size_t i, unsigned lanes) {
-    for (; lanes != 0; lanes &= lanes - 1) {
-      left[count++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(lanes));
-    }
-  };
-  std::size_t i = first;
-  for (; i + kLanes <= last; i += kLanes) {
-    prefetch_bodies(sweep, i + kAhead, kLanes, last);
-    add(i, one(i, kLanes));
-  }
-  if (i < last) add(i, one(i, static_cast<unsigned>(last - i)));
-  return count;
+  return for_each_vector<S::kLanes>(first, last, left, [&](std::size_t i, unsigned rows) {
+    prefetch_bodies(sweep, i + kAhead, S::kLanes, last);
+    return one(RowLanes<S>(sweep, i, rows));
+  });
 }
 
 template <class S>
 std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t last,
                        std::uint32_t* left) {
-  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i, unsigned rows) {
-    RowLanes<S>(sweep, i, rows).warm_start();
+  return for_each_vector<S>(sweep, first, last, left, [](const RowLanes<S>& lanes) {
+    lanes.warm_start();
     return 0u;
   });
 }
@@ -204,8 +181,8 @@ std::size_t warm_start(const SphereSweep& sweep, std::size_t first, std::size_t 
 template <class S, bool kUseBias>
 std::size_t solve(const SphereSweep& sweep, std::size_t first, std::size_t last,
                   std::uint32_t* left) {
-  return for_each_vector<S::kLanes>(sweep, first, last, left, [&](std::size_t i, unsigned rows) {
-    return RowLanes<S>(sweep, i, rows).template solve<kUseBias>();
+  return for_each_vector<S>(sweep, first, last, left, [](const RowLanes<S>& lanes) {
+    return lanes.template solve<kUseBias>();
   });
 }
 

@@ -55,6 +55,7 @@ template <class S>
 struct BodyLanes {
   QuadLanes<S> velocity, angular_velocity;
 
+  BodyLanes() = default;
   BodyLanes(const Real* all, const std::uint32_t* bodies)
       : velocity(QuadLanes<S>::load(all + solver_body_quad::kVelocity, kSweepStride, bodies)),
         angular_velocity(
@@ -64,6 +65,50 @@ struct BodyLanes {
     angular_velocity.store(all + solver_body_quad::kAngularVelocity, kSweepStride, bodies, lanes);
   }
 };
+
+/// Lanes of soft_step::Bias.
+template <class S>
+struct BiasLanes {
+  using Vec = typename S::Vec;
+  Vec velocity, mass_scale, impulse_scale, projection;
+
+  /// The arithmetic of bias_of().
+  /// @param is_apart whether the separation is > 0
+  /// @param softness function from a member of SweepSoftness to its lanes
+  template <bool kUseBias, class Softness>
+  static BiasLanes of(const SweepConstants& constants, Vec separation, typename S::Mask is_apart,
+                      const Softness& softness) {
+    const Vec zero = S::set(0), gap_velocity = separation * S::set(constants.inverse_h);
+    if constexpr (!kUseBias) {
+      return {S::select(is_apart, gap_velocity, zero), S::set(1), zero, zero};
+    }
+    const Vec push_out_speed = S::set(constants.push_out_speed);
+    const Vec max_bias_velocity = S::set(constants.max_bias_velocity);
+    const Vec wanted = S::negate(softness(&SweepSoftness::bias_rate)) * separation;
+    const Vec push = S::select(S::less(wanted, push_out_speed), wanted, push_out_speed);
+    const Vec speed = S::select(S::less(push, max_bias_velocity), push, max_bias_velocity);
+    return {S::select(is_apart, gap_velocity, S::negate(speed)),
+            S::select(is_apart, S::set(1), softness(&SweepSoftness::mass_scale)),
+            S::select(is_apart, zero, softness(&SweepSoftness::impulse_scale)),
+            S::select(is_apart, zero, (push - speed) * S::set(constants.h))};
+  }
+};
+
+/// Calls one(first, count) for all vectors of the rows [first, last), of which the last may be
+/// incomplete. It returns one bit for each row that it has skipped.
+/// @param left receives the skipped rows. @returns their number
+template <unsigned kLanes, class One>
+std::size_t for_each_vector(std::size_t first, std::size_t last, std::uint32_t* left,
+                            const One& one) {
+  std::size_t skipped = 0;
+  for (std::size_t i = first; i < last; i += kLanes) {
+    const std::size_t count = last - i < kLanes ? last - i : kLanes;
+    for (unsigned lanes = one(i, static_cast<unsigned>(count)); lanes != 0; lanes &= lanes - 1) {
+      left[skipped++] = static_cast<std::uint32_t>(i) + static_cast<unsigned>(__builtin_ctz(lanes));
+    }
+  }
+  return skipped;
+}
 
 }  // namespace
 }  // namespace cpu

@@ -23,6 +23,11 @@ inline constexpr std::size_t kShift = 8;            ///< shift, unused
 inline constexpr std::size_t kRotation = 12;        ///< rotation, unused
 }  // namespace solver_body_quad
 
+/// Copies of members of soft_step::StepConstants.
+struct SweepConstants {
+  Real h, inverse_h, push_out_speed, max_bias_velocity;
+};
+
 /// Copy of soft_step::Softness.
 struct SweepSoftness {
   Real bias_rate, mass_scale, impulse_scale;
