@@ -3,6 +3,7 @@
 #pragma once
 
 #include <jfpx/math.hpp>
+#include <jfpx/triangle_mesh.hpp>
 
 #include <variant>
 #include <vector>
@@ -71,7 +72,7 @@ struct Compound {
 /// @param compound each part must be in the ranges that validate() requires
 JFPX_API Compound centred(Compound compound);
 
-using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule>;
+using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh>;
 
 /// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

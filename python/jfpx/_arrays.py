@@ -125,6 +125,19 @@ def rows(array: Any, name: str, columns: int, dtype: Any = None) -> np.ndarray:
     return floats(array, name, dtype)
 
 
+def indices(array: Any, name: str, columns: int) -> np.ndarray:
+    """An array of shape (N, columns) of integers in [0, 2^32 - 1], as uint32."""
+    array = to_host(array if hasattr(array, "dtype") else plain_numbers(array, name), name)
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise InvalidArgument(f"{name} has shape {array.shape}; it must be (N, {columns})")
+    if array.dtype.kind not in "iu":
+        raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be an array of integers")
+    if array.size > 0 and not (int(array.min()) >= 0 and int(array.max()) < 2**32):
+        raise InvalidArgument(f"{name} has the index {int(array.min() if array.min() < 0 else array.max())}; "
+                              "it must be in [0, 2^32 - 1]")
+    return np.ascontiguousarray(array, np.uint32)
+
+
 def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
     """Radii: a number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
     if isinstance(array, (int, float, np.number)) and not isinstance(array, bool):

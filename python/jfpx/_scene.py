@@ -155,6 +155,59 @@ class Scene:
         self._scene.add_spheres(positions, _arrays.vector(radii, "radii", size, self._dtype),
                                 _arrays.vector(masses, "masses", size, self._dtype), speeds)
 
+    def add_triangle_mesh(self, vertices: Any, triangles: Any = None, *, two_sided: bool = False,
+                          **body: Any) -> dict[str, int]:
+        """Adds a body of mass 0 with the shape of a surface of triangles. Scenes copy the mesh.
+
+        ::
+
+            scene.add_triangle_mesh(vertices, triangles, position=[0, -1, 0], friction=0.8)
+            scene.add_triangle_mesh(trimesh.load("terrain.obj"))
+
+        Parameters
+        ----------
+        vertices : array (N, 3)
+            [m], each coordinate in [-1e9, 1e9]; or an object with the attributes `vertices` and
+            `faces`, such as a Trimesh of the package trimesh.
+        triangles : array (M, 3) of integers
+            Rows of `vertices`, counterclockwise seen from the front.
+        two_sided : bool
+            Whether bodies collide with the backs of triangles, too.
+        **body
+            Fields of the body, as in a scene: position, orientation, kinematic, velocity,
+            angular_velocity, friction, restitution, ...
+
+        Returns
+        -------
+        dict
+            Numbers of irregularities, which a mesh may have: "degenerate" and "duplicate" triangles,
+            which have no contacts; "open_edges" of one triangle; "shared_edges" of three or more
+            triangles, on which bodies may catch; "flipped_edges" of two triangles whose fronts are on
+            different sides.
+
+        Raises
+        ------
+        InvalidArgument
+            An array has a wrong shape or type, a coordinate is out of its range, or a row of
+            `triangles` has an index that is not that of a vertex.
+        InvalidScene
+            A field of the body is unknown or out of range, or there is no triangle.
+        """
+        if triangles is None:
+            if not (hasattr(vertices, "vertices") and hasattr(vertices, "faces")):
+                raise InvalidArgument("triangles is missing; pass arrays of vertices and triangles, or an "
+                                      "object with the attributes vertices and faces")
+            vertices, triangles = vertices.vertices, vertices.faces
+        if "shape" in body:
+            raise InvalidArgument("shape is given; the shape of the body is the mesh")
+        points = _arrays.rows(_arrays.converted(vertices, "vertices", self._dtype), "vertices", 3)
+        single = Scene({"bodies": [{"mass": 0, **body, "shape": {"type": "sphere", "radius": 1}}]},
+                       dtype=self._dtype)
+        report = self._scene.add_triangle_mesh(
+            single._scene, points, _arrays.indices(triangles, "triangles", 3),
+            bool(_arrays.instance(two_sided, "two_sided", bool)))
+        return dict(zip(("degenerate", "duplicate", "open_edges", "shared_edges", "flipped_edges"), report))
+
     @property
     def dtype(self) -> np.dtype:
         """Precision of a world that is made from the scene: float32 or float64."""

@@ -39,6 +39,28 @@ void bind_scene(nb::module_& module) {
              validate(grown);
              self = std::move(grown);
            })
+      .def("add_triangle_mesh",
+           [](Scene& self, const Scene& body, const Rows<const Real>& vertices,
+              const Rows<const std::uint32_t>& triangles, bool two_sided) {
+             TriangleMeshDef mesh{.two_sided = two_sided};
+             mesh.vertices.reserve(vertices.shape(0));
+             for (std::size_t i = 0; i < vertices.shape(0); ++i) {
+               mesh.vertices.push_back(vec3_at(vertices, i));
+             }
+             mesh.triangles.reserve(triangles.shape(0));
+             for (std::size_t i = 0; i < triangles.shape(0); ++i) {
+               mesh.triangles.push_back({triangles(i, 0), triangles(i, 1), triangles(i, 2)});
+             }
+             Scene grown = self;
+             grown.bodies.push_back(body.bodies.at(0));
+             TriangleMesh shape(std::move(mesh));
+             const TriangleMeshReport report = shape.report();
+             grown.bodies.back().shape = std::move(shape);
+             validate(grown);
+             self = std::move(grown);
+             return std::tuple(report.degenerate, report.duplicate, report.open_edges,
+                               report.shared_edges, report.flipped_edges);
+           })
       .def_prop_ro("name", [](const Scene& self) { return self.name; })
       .def_prop_ro("dt", [](const Scene& self) { return static_cast<double>(self.dt); })
       .def_prop_ro("bodies", [](const Scene& self) { return self.bodies.size(); })

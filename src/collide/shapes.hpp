@@ -5,6 +5,7 @@
 #include "src/collide/shapes/capsule.hpp"
 #include "src/collide/shapes/plane.hpp"
 #include "src/collide/shapes/sphere.hpp"
+#include "src/collide/shapes/triangle_mesh.hpp"
 
 #include <utility>
 
@@ -23,6 +24,13 @@ JFPX_HD inline Posed<S> instance(const S& solid, const Transform& pose) {
 JFPX_HD inline SphereInstance instance(const Sphere& sphere, const Transform& pose) {
   return {pose.origin, sphere.radius};
 }
+
+/// [m], the point that decides on which side of a triangle a solid is.
+template <class S>
+JFPX_HD inline const Vec3& centre_of(const Posed<S>& solid) {
+  return solid.pose.origin;
+}
+JFPX_HD inline const Vec3& centre_of(const SphereInstance& sphere) { return sphere.centre; }
 
 /// The contact of two solids. Each pair of kinds has one test, for one order of the kinds, in the
 /// header of a solid. A missing test is a compile error.

@@ -70,9 +70,16 @@ void for_each_part(const Shape& shape, const Visit& visit) {
 template <class S>
 inline constexpr bool kIsPolyhedron = false;
 
-/// Whether S is a solid, as opposed to a half-space or a plane.
+/// Whether S is a solid, as opposed to a half-space, a plane or a mesh.
 template <class S>
 inline constexpr bool kIsSolid = kSolidKind<S> < SolidKinds::kCount;
+
+/// Whether S is a surface of triangles, whose bodies have mass 0.
+template <class S>
+inline constexpr bool kIsMesh = std::is_same_v<S, TriangleMesh>;
+/// Whether S is infinite and ignores the pose of its body.
+template <class S>
+inline constexpr bool kIsWall = std::is_same_v<S, HalfSpace> || std::is_same_v<S, Plane>;
 
 }  // namespace detail
 }  // namespace JFPX_ABI

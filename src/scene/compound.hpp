@@ -24,11 +24,11 @@ inline Real outer_radius(const CompoundPart& part) {
   const auto radius = [](const auto& solid) { return detail::outer_radius(solid); };
   return length(part.position) + std::visit(radius, part.shape);
 }
-/// Outer radius of all solids of a body; 0 for half-spaces and planes.
+/// Outer radius of all solids of a body, or of its mesh; 0 for half-spaces and planes.
 inline Real outer_radius(const Shape& shape) {
   Real radius = 0;
   detail::for_each_part(shape, [&](const auto& s, const CompoundPart* part, std::uint32_t) {
-    if constexpr (detail::kIsSolid<std::decay_t<decltype(s)>>) {
+    if constexpr (!detail::kIsWall<std::decay_t<decltype(s)>>) {
       radius = std::max(radius, part != nullptr ? outer_radius(*part) : detail::outer_radius(s));
     }
   });
@@ -40,7 +40,7 @@ inline bool is_wall(const Shape& shape) {
   return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
 }
 
-/// [kg m^2], inertia tensor of a solid body; zero for half-spaces and planes.
+/// [kg m^2], inertia tensor of a solid body; zero for half-spaces, planes and meshes.
 inline Mat3 solid_inertia(const Shape& shape, Real mass) {
   const auto tensor = [mass](const auto& s) -> Mat3 {
     using S = std::decay_t<decltype(s)>;

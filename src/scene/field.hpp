@@ -49,7 +49,8 @@ struct Enumerator {
   constexpr bool contains(auto value) const { return to_string(value) != nullptr; }
 };
 
-/// Lists with at least one item. The text is the end of the sentence "it must have ...".
+/// Lists with at least one item, whose items are valid. The text is the end of the sentence "it
+/// must have ...".
 struct NotEmpty {
   const char* text;
 };

@@ -74,6 +74,15 @@ bool is_in_range(const Field<kPresence, NotEmpty>& field, const std::vector<T>& 
   return !members.empty();
 }
 
+template <Presence kPresence, class T>
+requires(!HasFields<T>) bool is_in_range(const Field<kPresence, NotEmpty>& field,
+                                         const std::vector<T>& members, std::string* found) {
+  if (members.empty()) {
+    *found = std::string(field.name) + " is empty; it must have " + field.range.text;
+  }
+  return !members.empty();
+}
+
 template <HasFields T>
 bool are_in_range(const T& object, std::string* found) {
   bool are = true;

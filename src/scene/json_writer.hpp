@@ -30,6 +30,9 @@ inline detail::SceneJson to_value(const Quat& q) {
 inline detail::SceneJson to_value(const Mat3& m) {
   return detail::SceneJson::array({to_value(m.row[0]), to_value(m.row[1]), to_value(m.row[2])});
 }
+inline detail::SceneJson to_value(const Triangle& triangle) {
+  return detail::SceneJson::array({triangle[0], triangle[1], triangle[2]});
+}
 inline detail::SceneJson to_value(const BodyPair& pair) {
   return detail::SceneJson::array({pair.a, pair.b});
 }

@@ -185,7 +185,11 @@ void read(const Json& json, const std::string& where, std::variant<Types...>& ou
   object.required("type", type);
   const auto read_if = [&](auto value) {
     if (!is_name_of<decltype(value)>(type)) return false;
-    object.fields(value);
+    try {
+      object.fields(value);
+    } catch (const InvalidArgument& error) {  // by the constructor of a shape
+      fail(where, error.what());
+    }
     out = std::move(value);
     return true;
   };
@@ -212,6 +216,14 @@ void read(const Json& json, const std::string& where, std::optional<BodyId>& bod
   read(json, where, body.emplace());
 }
 
+void read(const Json& json, const std::string& where, Triangle& triangle) {
+  if (!json.is_array() || json.size() != 3) {
+    fail(where, "must be an array of 3 indices of vertices");
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    read(json[i], where + "[" + std::to_string(i) + "]", triangle[i]);
+  }
+}
 void read(const Json& json, const std::string& where, BodyPair& pair) {
   if (!json.is_array() || json.size() != 2) fail(where, "must be an array of 2 indices of bodies");
   read(json[0], where + "[0]", pair.a);

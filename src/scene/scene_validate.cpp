@@ -76,6 +76,9 @@ std::string find_coupled_fault(const BodyDef& def) {
   if (def.kinematic && std::holds_alternative<Plane>(def.shape)) {
     return "kinematic is true; it must be false for a plane, which follows no pose";
   }
+  if (def.mass > 0 && std::holds_alternative<TriangleMesh>(def.shape)) {
+    return fault("mass", def.mass, "0 for a triangle mesh, which has no volume");
+  }
   if (def.mass > 0 && std::holds_alternative<HalfSpace>(def.shape)) {
     return fault("mass", def.mass, "0 for a half-space, which fills half of the world");
   }

@@ -5,6 +5,9 @@
 
 #include "src/scene/field.hpp"
 
+#include <type_traits>
+#include <utility>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 
@@ -30,6 +33,16 @@ void each_field(Is<Plane> auto& plane, const auto& visit) {
   auto& [normal, offset] = plane;
   visit(required_field("normal", kUnitVector), normal);
   visit(required_field("offset", kInWorld), offset);
+}
+/// The constructor of the mesh checks the vertices, and the indices of the triangles.
+void each_field(Is<TriangleMesh> auto& mesh, const auto& visit) {
+  constexpr bool kIsRead = !std::is_const_v<std::remove_reference_t<decltype(mesh)>>;
+  std::conditional_t<kIsRead, TriangleMeshDef, const TriangleMeshDef&> def = mesh.def();
+  auto& [vertices, triangles, two_sided] = def;
+  visit(required_field("vertices"), vertices);
+  visit(required_field("triangles", NotEmpty{"at least one triangle"}), triangles);
+  visit(field("two_sided"), two_sided);
+  if constexpr (kIsRead) mesh = TriangleMesh(std::move(def));
 }
 void each_field(Is<CompoundPart> auto& part, const auto& visit) {
   auto& [shape, position, orientation, density] = part;

@@ -28,7 +28,8 @@ std::uint64_t ContactSearch::find_contacts(const BodyStore& bodies, ContactFinde
   for (const Candidate& c : candidates_) {
     const Vec3 &a = bodies.moving.position[c.a], &b = bodies.moving.position[c.b];
     manifold.clear();
-    find_contact(sub_shapes, c.sub_shape_a, c.sub_shape_b, a, {{}, 0, 0, a, b}, &manifold);
+    find_contact(sub_shapes, c.sub_shape_a, c.sub_shape_b, c.element, a, {{}, 0, 0, a, b},
+                 &manifold);
     for (std::uint32_t i = 0; i < manifold.touch_count; ++i) {
       const auto& [point, distance] = manifold.touches[i];
       contacts->push_back({bodies.id(c.a), bodies.id(c.b), manifold.normal, point, distance});

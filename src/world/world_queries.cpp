@@ -1,6 +1,7 @@
 /// Ray and overlap queries: exact tests of the bodies that a bounding-volume tree selects.
 #include <jfpx/error.hpp>
 
+#include "src/collide/mesh_queries.hpp"
 #include "src/scene/scene_validate.hpp"
 #include "src/world/bodies/posed_sub_shapes.hpp"
 #include "src/world/world_impl.hpp"
@@ -45,10 +46,12 @@ Ray checked(const Ray& ray) {
   return {ray.origin, unit_direction(ray.direction), ray.max_distance};
 }
 
-/// A solid has a pose; a wall has none.
+/// A solid or a mesh has a pose; a wall has none.
 template <class S>
 detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
-  if constexpr (detail::kIsSolid<S>) {
+  if constexpr (detail::kIsMesh<S>) {
+    return detail::enter(ray.origin, ray.direction, shape, pose, ray.max_distance);
+  } else if constexpr (detail::kIsSolid<S>) {
     return detail::enter(ray.origin, ray.direction, shape, pose);
   } else {
     return detail::enter(ray.origin, ray.direction, shape);
@@ -83,11 +86,20 @@ bool before(const RayHit& a, const RayHit& b) {
 bool accepts(const BodyFilter& filter, BodyId body) { return !filter || filter(body); }
 
 /// Whether a solid touches a shape. @param solid in the form that find_contact() accepts
+/// @param extents [m], half extents of the solid's bounds
 template <class Instance, class S>
-bool touch(const Instance& solid, const Vec3& centre, const S& shape, const Transform& pose) {
+bool touch(const Instance& solid, const Vec3& centre, const Vec3& extents, const S& shape,
+           const Transform& pose) {
   const detail::PairMotion at_rest{{}, 0, 0, {}, {}};
   detail::PairManifold manifold;
-  if constexpr (std::is_same_v<S, HalfSpace> || std::is_same_v<S, Plane>) {
+  if constexpr (detail::kIsMesh<S>) {
+    const detail::MeshView mesh = detail::view_of(shape);
+    detail::visit_triangles_around(mesh, pose, centre, extents, [&](std::uint32_t triangle) {
+      if (manifold.touch_count > 0) return;
+      manifold.clear();
+      find_contact_with_triangle(solid, mesh, triangle, pose, at_rest, &manifold);
+    });
+  } else if constexpr (detail::kIsWall<S>) {
     find_contact(solid, to_wall(shape).solid_for(centre), at_rest, &manifold);
   } else {
     detail::find_contact_of_any(solid, detail::instance(shape, pose), at_rest, &manifold);
@@ -105,7 +117,7 @@ std::vector<BodyId> bodies_touching(const S& solid, const Transform& pose, const
   tree.visit_around(pose.origin, extents, [&](std::uint32_t body) {
     bool touches = false;
     for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& at) {
-      touches = touches || touch(instance, pose.origin, shape, at);
+      touches = touches || touch(instance, pose.origin, extents, shape, at);
     });
     if (touches) found.push_back(bodies.id(body));
   });

@@ -7,6 +7,7 @@
 
 #include "src/collide/sphere_pair.hpp"
 #include "src/world/bodies/body_store.hpp"
+#include "src/world/bodies/sub_shape_view.hpp"
 
 #include <algorithm>
 #include <tuple>
@@ -48,10 +49,12 @@ class ContactOracle {
     bool is_wall() const {
       return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
     }
-    /// Order of the kinds: spheres, boxes, capsules, walls.
+    bool is_mesh() const { return std::holds_alternative<TriangleMesh>(shape); }
+    /// Order of the kinds: spheres, boxes, capsules, meshes, walls.
     int kind() const {
       if (is_sphere()) return 0;
-      return std::holds_alternative<Box>(shape) ? 1 : is_wall() ? 3 : 2;
+      if (std::holds_alternative<Box>(shape)) return 1;
+      return is_mesh() ? 3 : is_wall() ? 4 : 2;
     }
     SolidShape solid() const {
       if (is_sphere()) return std::get<Sphere>(shape);
@@ -97,11 +100,30 @@ class ContactOracle {
       const PairResult r = detail::test_sphere_pair(a, b);
       if (r.touching == 0) return;
       add(p, q, swap ? -r.normal : r.normal, middle_point(r.normal, r.distance, b), r.distance);
+    } else if (q.is_mesh()) {
+      test_triangles(p, q);
     } else if (q.is_wall()) {
       add(p, q, collide(p.solid(), p.pose, solid(q.shape, p.body)));
     } else {
       add(p, q, collide(p.solid(), p.pose, q.solid(), q.pose));
     }
+  }
+
+  /// Tests all triangles of a mesh.
+  void test_triangles(const SubShape& p, const SubShape& mesh) {
+    const detail::MeshView view = detail::view_of(std::get<TriangleMesh>(mesh.shape));
+    const auto test_solid = [&](const auto& solid) {
+      for (std::uint32_t i = 0; i < view.triangle_count; ++i) {
+        if (!view.triangles[i].has_contacts()) continue;
+        detail::PairManifold found;
+        find_contact_with_triangle(detail::instance(solid, p.pose), view, i, mesh.pose, {}, &found);
+        for (std::uint32_t k = 0; k < found.touch_count; ++k) {
+          const auto& [point, distance] = found.touches[k];
+          add(p, mesh, found.normal, point, distance);
+        }
+      }
+    };
+    std::visit(test_solid, p.solid());
   }
 
   /// The half-space with which a wall collides with a body.

@@ -2,7 +2,8 @@ jfpx_add_test(collide_test INTERNAL SOURCES
   collide/box_pair_test.cpp
   collide/capsule_test.cpp
   collide/collide_test.cpp
-  collide/pair_oracle_test.cpp)
+  collide/pair_oracle_test.cpp
+  collide/triangle_mesh_test.cpp)
 # Has private names of the other tests.
 set_source_files_properties(collide/box_pair_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(JFPX_HAS_CUDA)

@@ -390,9 +390,9 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
               HasSubstr("body 0.position: must be an array of 3 numbers"));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"mass": 1}]})"),
               HasSubstr("body 0: has no field \"shape\""));
-  EXPECT_THAT(
-      complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
-      HasSubstr("\"cone\"; it must be sphere, box, half_space, plane, compound or capsule"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
+              HasSubstr("\"cone\"; it must be sphere, box, half_space, plane, compound, capsule or "
+                        "triangle_mesh"));
   const auto with_parts = [](const std::string& parts) {
     return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "compound", "parts": )" + parts +
            "}}]}";

@@ -4,7 +4,8 @@
 #include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
-#include "src/collide/shapes.hpp"
+#include "src/collide/mesh_queries.hpp"
+#include "src/world/bodies/sub_shape_view.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -78,11 +79,30 @@ class LinearQueries {
 
   template <class S>
   static detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
-    if constexpr (detail::kIsSolid<S>) {
+    if constexpr (detail::kIsMesh<S>) {
+      return enter_mesh(ray, detail::view_of(shape), pose);
+    } else if constexpr (detail::kIsSolid<S>) {
       return detail::enter(ray.origin, ray.direction, shape, pose);
     } else {
       return detail::enter(ray.origin, ray.direction, shape);
     }
+  }
+
+  /// The first hit of all triangles, without the tree.
+  static detail::RayEntry enter_mesh(const Ray& ray, const detail::MeshView& mesh,
+                                     const Transform& pose) {
+    const Vec3 from = inverse_transform_point(pose, ray.origin);
+    const Vec3 along = inverse_transform_direction(pose, ray.direction);
+    const detail::MeshRay ray_in_mesh(from, along);
+    detail::RayEntry first;
+    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+      if (!mesh.triangles[i].has_contacts()) continue;
+      const Real distance = ray_in_mesh.hit(mesh, i);
+      if (!(distance >= 0) || (first.hit && distance >= first.distance)) continue;
+      const Vec3& n = mesh.triangles[i].normal;
+      first = {true, distance, pose.basis * (dot(n, along) > 0 ? -n : n)};
+    }
+    return first;
   }
 
   /// Scales by a power of two before the normalization, as in a World.
@@ -109,6 +129,22 @@ class LinearQueries {
     }
   }
 
+  static bool touches_mesh(const SolidShape& solid, const Transform& at,
+                           const detail::MeshView& mesh, const Transform& pose) {
+    bool any = false;
+    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+      if (!mesh.triangles[i].has_contacts()) continue;
+      detail::PairManifold manifold;
+      std::visit(
+          [&](const auto& s) {
+            find_contact_with_triangle(detail::instance(s, at), mesh, i, pose, {}, &manifold);
+          },
+          solid);
+      any |= manifold.touch_count > 0;
+    }
+    return any;
+  }
+
   std::vector<BodyId> bodies_touching(const SolidShape& solid, const Transform& at) const {
     const auto touches = [&](const auto& shape, const Transform& pose) {
       using S = std::decay_t<decltype(shape)>;
@@ -120,6 +156,8 @@ class LinearQueries {
                        behind ? HalfSpace{-shape.normal, -shape.offset}
                               : HalfSpace{shape.normal, shape.offset})
                    .count > 0;
+      } else if constexpr (detail::kIsMesh<S>) {
+        return touches_mesh(solid, at, detail::view_of(shape), pose);
       } else {
         return collide(solid, at, SolidShape(shape), pose).count > 0;
       }

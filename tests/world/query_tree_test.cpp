@@ -51,6 +51,12 @@ class RandomPlace {
       }
     };
     std::visit(scale, def.shape);
+    if (auto* mesh = std::get_if<TriangleMesh>(&def.shape)) {
+      TriangleMeshDef scaled = mesh->def();
+      const Real most = std::min(size_, kMaxCoordinate / 100);
+      for (Vec3& vertex : scaled.vertices) vertex *= most;
+      *mesh = TriangleMesh(std::move(scaled));
+    }
     if (auto* compound = std::get_if<Compound>(&def.shape)) {
       for (CompoundPart& part : compound->parts) {
         std::visit(scale, part.shape);

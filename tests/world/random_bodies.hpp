@@ -42,17 +42,45 @@ inline Compound random_compound(Random* random) {
   return centred(compound);
 }
 
+/// Whether a body with the shape may be movable.
+inline bool has_volume(const Shape& shape) {
+  return !std::holds_alternative<HalfSpace>(shape) && !std::holds_alternative<Plane>(shape) &&
+         !std::holds_alternative<TriangleMesh>(shape);
+}
+
+/// A sheet of triangles, with holes.
+inline TriangleMesh random_mesh(Random* random) {
+  const auto columns = static_cast<std::uint32_t>(2 + random->below(4));
+  const auto rows = static_cast<std::uint32_t>(2 + random->below(4));
+  const Real size = random->uniform(0.3_r, 2);
+  const Real roughness = random->below(3) == 0 ? Real(0) : random->uniform(0, 1);
+  TriangleMeshDef def;
+  for (std::uint32_t i = 0; i < rows * columns; ++i) {
+    const auto x = static_cast<Real>(i % columns), z = static_cast<Real>(i / columns);
+    def.vertices.push_back(Vec3{x, roughness * random->uniform(-1, 1), z} * size);
+  }
+  for (std::uint32_t i = 0; i + columns + 1 < rows * columns; ++i) {
+    if (i % columns == columns - 1) continue;
+    if (random->below(8) != 0) def.triangles.push_back({i, i + columns, i + 1});
+    if (random->below(8) != 0) def.triangles.push_back({i + 1, i + columns, i + columns + 1});
+  }
+  def.triangles.push_back({0, columns, 1});
+  def.two_sided = random->below(2) == 0;
+  return TriangleMesh(std::move(def));
+}
+
 /// A sphere, another solid or a compound with a probability of about a third each, sometimes
-/// immovable; rarely a wall.
+/// immovable; rarely a mesh or a wall.
 inline BodyDef random_body(Random* random, Real room) {
   BodyDef def;
-  const std::uint64_t kind = random->below(31);
+  const std::uint64_t kind = random->below(33);
   if (kind == 0) def.shape = HalfSpace{rotate(random_rotation(random), {1, 0, 0}), -room};
   if (kind == 1)
     def.shape = Plane{rotate(random_rotation(random), {1, 0, 0}), random->uniform(-1, 1)};
   if (kind > 1) def.shape = std::visit([](auto s) -> Shape { return s; }, random_sub_shape(random));
   if (kind > 20) def.shape = random_compound(random);
-  def.mass = kind < 2 || random->below(6) == 0 ? Real(0) : random->uniform(0.5_r, 2);
+  if (kind > 30) def.shape = random_mesh(random);
+  def.mass = kind < 2 || kind > 30 || random->below(6) == 0 ? Real(0) : random->uniform(0.5_r, 2);
   def.position = random->uniform_in_box({-room, -room, -room}, {room, room, room});
   def.orientation = random_rotation(random);
   return def;

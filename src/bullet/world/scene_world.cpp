@@ -12,10 +12,12 @@
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
 #include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
@@ -73,6 +75,26 @@ class ShapeStore {
     shapes_.emplace_back(new btStaticPlaneShape(to_bullet(plane.normal), plane.offset));
     return shapes_.back().get();
   }
+  /// Bullet's meshes are two-sided. Copies of a mesh share their data.
+  btCollisionShape* make(const TriangleMesh& mesh, const btTransform&) {
+    if (share_) {
+      const auto found = shared_meshes_.find(mesh.data());
+      if (found != shared_meshes_.end()) return found->second;
+    }
+    auto triangles = std::make_unique<btTriangleMesh>();
+    triangles->preallocateVertices(static_cast<int>(mesh.vertices().size()));
+    triangles->preallocateIndices(static_cast<int>(3 * mesh.triangles().size()));
+    for (const Vec3& vertex : mesh.vertices()) {
+      triangles->findOrAddVertex(to_bullet(vertex), false);
+    }
+    for (const auto& [a, b, c] : mesh.triangles()) {
+      triangles->addTriangleIndices(static_cast<int>(a), static_cast<int>(b), static_cast<int>(c));
+    }
+    shapes_.emplace_back(new btBvhTriangleMeshShape(triangles.get(), true));
+    triangles_.push_back(std::move(triangles));
+    if (share_) shared_meshes_.emplace(mesh.data(), shapes_.back().get());
+    return shapes_.back().get();
+  }
   /// Unreachable, because require_bullet() rejects planes.
   btCollisionShape* make(const Plane&, const btTransform&) { return nullptr; }
 
@@ -106,7 +128,9 @@ class ShapeStore {
   }
 
   bool share_;
+  std::vector<std::unique_ptr<btTriangleMesh>> triangles_;  ///< of the shapes
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
+  std::map<std::shared_ptr<const detail::MeshData>, btCollisionShape*> shared_meshes_;
   std::map<Key, btCollisionShape*> shared_;
 };
 

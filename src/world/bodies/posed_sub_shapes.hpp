@@ -15,7 +15,7 @@ void for_each_posed_sub_shape(const BodyStore& bodies, std::uint32_t body, const
       make_transform(bodies.moving.orientation[body], bodies.moving.position[body]);
   detail::for_each_part(
       bodies.shape(body), [&](const auto& shape, const CompoundPart* part, std::uint32_t) {
-        if constexpr (!detail::kIsSolid<std::decay_t<decltype(shape)>>) {
+        if constexpr (detail::kIsWall<std::decay_t<decltype(shape)>>) {
           visit(shape, Transform{});
         } else {
           visit(shape, part == nullptr ? whole

@@ -14,6 +14,8 @@ template <class S>
 std::uint32_t range_of(const S&, bool is_movable) {
   if constexpr (detail::kIsSolid<S>) {
     return SubShapeRanges::range_of(detail::kSolidKind<S>, is_movable);
+  } else if constexpr (detail::kIsMesh<S>) {
+    return SubShapeRanges::kMeshes;
   } else {
     return SubShapeRanges::kWalls;
   }
@@ -45,6 +47,7 @@ void SubShapeTable::set_bodies(const BodyStore& bodies, std::span<const BodyId> 
   bounds_.resize(ranges_.bounded());
   part_.resize(ranges_.bounded());
   solids_.resize(ranges_.bounded() - ranges_.spheres());
+  meshes_.resize(ranges_.bounded() - ranges_.meshes_begin());
   walls_.resize(ranges_.all() - ranges_.bounded());
   local_.clear();
   local_.reserve(parts);
@@ -54,7 +57,13 @@ void SubShapeTable::set_bodies(const BodyStore& bodies, std::span<const BodyId> 
     const SubShape i = next.begin[range]++;
     body_[i] = body;
     number_[i] = number;
-    if constexpr (detail::kIsSolid<std::decay_t<decltype(shape)>>) {
+    using S = std::decay_t<decltype(shape)>;
+    if constexpr (detail::kIsMesh<S>) {
+      bounds_[i] = {{}, detail::bounding_radius(shape)};
+      solids_[i - ranges_.spheres()].solid = detail::enclosing_box(shape);
+      meshes_[i - ranges_.meshes_begin()] = detail::view_of(shape);
+      part_[i] = 0;
+    } else if constexpr (detail::kIsSolid<S>) {
       bounds_[i] = {{}, detail::bounding_radius(shape)};
       if (range > 0) solids_[i - ranges_.spheres()].solid = detail::to_solid(shape);
       part_[i] = 0;
@@ -79,6 +88,7 @@ SubShapeView SubShapeTable::view() {
           .numbers = number_.data(),
           .all_bounds = bounds_.data(),
           .solids = solids_.data(),
+          .meshes = meshes_.data(),
           .walls = walls_.data(),
           .parts = part_.data(),
           .local = local_.data()};

@@ -32,6 +32,7 @@ class SubShapeTable {
   std::span<const SphereInstance> bounds() const { return {bounds_.data(), ranges_.fixed_begin()}; }
   /// Solids of kinematic bodies other than spheres, ascending.
   std::span<const SubShape> kinematic() const { return kinematic_; }
+  std::span<const detail::MeshView> meshes() const { return meshes_; }
   /// Number of parts of compounds.
   std::size_t part_count() const { return local_.size(); }
 
@@ -39,8 +40,9 @@ class SubShapeTable {
   SubShapeRanges ranges_;
   std::vector<std::uint32_t> body_;     ///< by sub-shape
   std::vector<std::uint32_t> number_;   ///< by sub-shape: its index in the compound
-  std::vector<SphereInstance> bounds_;  ///< of solids
-  std::vector<PosedSolid> solids_;      ///< of solids other than spheres
+  std::vector<SphereInstance> bounds_;  ///< of solids and meshes
+  std::vector<PosedSolid> solids_;      ///< of solids other than spheres, and boxes around meshes
+  std::vector<detail::MeshView> meshes_;
   std::vector<Wall> walls_;
   std::vector<std::uint32_t> part_;  ///< by solid: 0, or 1 + index in local_
   std::vector<Transform> local_;     ///< poses of parts, in body axes

@@ -21,7 +21,9 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
                                    const FindLast& find_last, CandidateManifold* found) {
   const BodyView& bodies = bounds.bodies;
   found->key = {pair.a, pair.b, bounds.sub_shapes.part(pair.sub_shape_a),
-                bounds.sub_shapes.part(pair.sub_shape_b)};
+                bounds.sub_shapes.is_mesh(pair.sub_shape_b)
+                    ? pair.element
+                    : bounds.sub_shapes.part(pair.sub_shape_b)};
   found->clear();
   const bool is_recyclable = bounds.sub_shapes.is_polyhedron(pair.sub_shape_a) &&
                              bounds.sub_shapes.is_polyhedron(pair.sub_shape_b);
@@ -30,13 +32,13 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
     if (last != nullptr && recycle(bounds, pair, *last, last_points, found)) return;
   }
   found->tested = {};
-  const Vec3 motion = bodies.predicted_motion(pair.a) - bodies.predicted_motion(pair.b);
+  const Vec3 motion = bounds.motion_of(pair);
   const Vec3& centre = bodies.position[pair.a];
   const Real margin = bounds.margin_of(pair);
   // Farther shapes do not meet. Boxes are then separated by the first axis that shows it. The slack
   // is more than rounding and the preference for an earlier axis change.
   const Real limit = (margin + length(motion)) * Real(1.1);
-  find_contact(bounds.sub_shapes, pair.sub_shape_a, pair.sub_shape_b, centre,
+  find_contact(bounds.sub_shapes, pair.sub_shape_a, pair.sub_shape_b, pair.element, centre,
                {motion, margin, limit, centre, bodies.position[pair.b]}, found);
   if (bodies.sensor[pair.a] != 0 || bodies.sensor[pair.b] != 0) found->point_count = 0;
   if (is_recyclable && found->point_count > 0) note_test(bodies, found);

@@ -169,8 +169,9 @@ void ContactFinder::find_fixed_pairs(SubShape first, SubShape last,
   for (SubShape i = first; i < last; ++i) {
     if (!swept_bounds_.bodies.movable(swept_bounds_.sub_shapes.body(i))) continue;
     const auto before = static_cast<std::ptrdiff_t>(candidates->size());
-    swept_bounds_.visit_fixed(i, trees, [&](SubShape fixed) {
-      candidates->push_back(ordered(swept_bounds_.bodies, swept_bounds_.sub_shapes, i, fixed));
+    swept_bounds_.visit_fixed(i, trees, [&](SubShape fixed, std::uint32_t element) {
+      candidates->push_back(
+          ordered(swept_bounds_.bodies, swept_bounds_.sub_shapes, i, fixed, element));
     });
     std::sort(candidates->begin() + before, candidates->end());
   }

@@ -112,7 +112,24 @@ struct SweptBounds {
   JFPX_HD Real margin_of(const Candidate& pair) const {
     const SubShape p = pair.sub_shape_a, q = pair.sub_shape_b;
     if (sub_shapes.is_wall(q)) return 2 * margins[p] + spin(p);
+    if (sub_shapes.is_mesh(q)) {
+      const Real size = sub_shapes.bounds(p).radius;
+      return 2 * smaller(margins[p], margins[q]) + spin(p) +
+             smaller(turn_of_mesh(q), Real(1)) * size;
+    }
     return 2 * smaller(margins[p], margins[q]) + spin(p) + spin(q);
+  }
+
+  /// [m], predicted relative motion of the sub-shapes of a candidate. A mesh has the motion of its
+  /// point at the centre of the solid.
+  JFPX_HD Vec3 motion_of(const Candidate& pair) const {
+    const Vec3 relative = bodies.predicted_motion(pair.a) - bodies.predicted_motion(pair.b);
+    if (sub_shapes.is_wall(pair.sub_shape_b) || !sub_shapes.is_mesh(pair.sub_shape_b) ||
+        bodies.awake[pair.b] == 0) {
+      return relative;
+    }
+    const Vec3 arm = sub_shapes.bounds(pair.sub_shape_a).centre - bodies.position[pair.b];
+    return relative - cross(bodies.angular_velocity[pair.b], arm) * bodies.dt;
   }
 
   /// [m], the part of margin_of() that does not depend on motion, for two solids
@@ -148,13 +165,19 @@ struct SweptBounds {
     const Vec3 half{reach, reach, reach};
     return {sphere.centre - half, sphere.centre + half};
   }
-  /// Calls visit(fixed) in any order for the walls and the other solids of mass 0, except spheres,
-  /// that a movable sub-shape may touch.
+  /// Calls visit(fixed, element) in any order for the walls, the solids of mass 0 except spheres,
+  /// and the triangles of meshes that a movable sub-shape may touch. Only triangles have an element
+  /// other than 0.
   template <class Visit>
   JFPX_HD void visit_fixed(SubShape i, const FixedTreesView& trees, const Visit& visit) const {
     const std::uint32_t body = sub_shapes.body(i);
     const auto test = [&](SubShape fixed) {
-      if (bodies.may_collide(body, sub_shapes.body(fixed)) && may_meet(i, fixed)) visit(fixed);
+      if (!bodies.may_collide(body, sub_shapes.body(fixed)) || !may_meet(i, fixed)) return;
+      if (sub_shapes.is_mesh(fixed)) {
+        visit_triangles(i, fixed, visit);
+      } else {
+        visit(fixed, 0u);
+      }
     };
     const Aabb box = query_bounds(i);
     const SubShape first = sub_shapes.ranges.fixed_begin();
@@ -167,6 +190,35 @@ struct SweptBounds {
   }
 
  private:
+  /// Calls visit(mesh, triangle) for the triangles of a mesh whose motion may touch that of a
+  /// sub-shape. Conservative.
+  template <class Visit>
+  JFPX_HD void visit_triangles(SubShape i, SubShape mesh, const Visit& visit) const {
+    const detail::MeshView& view = sub_shapes.mesh(mesh);
+    const Transform& pose = sub_shapes.solid(mesh).pose;
+    const SphereInstance& sphere = swept[i];
+    const Vec3 offset = sphere.centre - pose.origin;
+    Real reach = sphere.radius + margins[mesh];
+    if (bodies.awake[sub_shapes.body(mesh)] != 0) {
+      const Real distance = length(offset) + reach;
+      reach +=
+          length(motion[sub_shapes.body(mesh)]) + smaller(turn_of_mesh(mesh), Real(2)) * distance;
+    }
+    reach += 64 * kEpsilon * (sum(sphere.centre) + sum(pose.origin) + reach);
+    const Vec3 local = transform_transpose(pose.basis, offset), half{reach, reach, reach};
+    view.tree.visit_overlapping({local - half, local + half}, [&](std::uint32_t index) {
+      const detail::MeshTriangle& triangle = view.triangles[index];
+      const Vec3 arm = local - view.vertices[triangle.vertices[0]];
+      const Real height = dot(triangle.normal, arm);
+      if (absolute(height) <= reach + 8 * kEpsilon * sum(arm)) visit(mesh, index);
+    });
+  }
+  /// [rad], rotation of a mesh in the step.
+  JFPX_HD Real turn_of_mesh(SubShape mesh) const {
+    const std::uint32_t body = sub_shapes.body(mesh);
+    if (bodies.awake[body] == 0) return 0;
+    return length(bodies.angular_velocity[body]) * bodies.dt;
+  }
   /// Enlarges by more than the rounding errors of the centre and of the radius.
   JFPX_HD static SphereInstance rounded(SphereInstance sphere) {
     const Vec3& c = sphere.centre;

@@ -130,17 +130,18 @@ struct SphereProgram {
   }
 
  private:
-  JFPX_HD void add_candidate(std::uint32_t a, std::uint32_t b) const {
+  JFPX_HD void add_candidate(std::uint32_t a, std::uint32_t b, std::uint32_t element = 0) const {
     const std::uint32_t place = atomic_add(&data.counters->candidates, 1);
     if (place >= data.capacity.candidates) return;
-    data.candidates[place] = ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b);
+    data.candidates[place] = ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b, element);
   }
 
   /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may touch.
   JFPX_HD void find_fixed(std::uint32_t i) const {
     if (!data.step.bodies.movable(data.swept_bounds.sub_shapes.body(i))) return;
-    data.swept_bounds.visit_fixed(i, data.trees,
-                                  [&](std::uint32_t fixed) { add_candidate(i, fixed); });
+    data.swept_bounds.visit_fixed(i, data.trees, [&](std::uint32_t fixed, std::uint32_t element) {
+      add_candidate(i, fixed, element);
+    });
   }
 
   /// @returns whether the pair is a contact of two spheres

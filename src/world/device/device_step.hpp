@@ -298,6 +298,7 @@ class DeviceStep final : public DeviceWorld {
   SubShapes& current_sub_shapes() { return sub_shapes_[sub_shapes_now_]; }
   void use_sub_shapes() {
     data_.swept_bounds.sub_shapes = current_sub_shapes().view();
+    data_.swept_bounds.sub_shapes.meshes = trees_.meshes();
     scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().ranges().bounded(), &data_);
     is_ready_ = false;
   }
@@ -305,6 +306,7 @@ class DeviceStep final : public DeviceWorld {
   void update_trees(const BodyStore& bodies) {
     if (!trees_.upload(transfer_, bodies, data_.swept_bounds.largest_margin)) return;
     data_.trees = trees_.view();
+    data_.swept_bounds.sub_shapes.meshes = trees_.meshes();
     ++changes_;
   }
 

@@ -1,10 +1,10 @@
-/// The trees of the solids of mass 0 in the memory of a device.
+/// The trees of the solids of mass 0, and their meshes, in the memory of a device.
 #pragma once
 
 #include "src/world/contacts/fixed_trees.hpp"
-#include "src/world/device/transfer.hpp"
+#include "src/world/device/block_tree_buffers.hpp"
+#include "src/world/device/mesh_buffers.hpp"
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -40,6 +40,7 @@ class FixedTreeBuffers {
     trees_.set_bodies(table_, bounds);
     view_ = {immovable_.upload(transfer, trees_.view().immovable),
              kinematic_.upload(transfer, trees_.view().kinematic)};
+    meshes_ = mesh_buffers_.upload(transfer, bodies, ids_);
     transfer.wait();
     version_ = bodies.fixed_version();
     return true;
@@ -47,23 +48,13 @@ class FixedTreeBuffers {
   /// The next upload() copies the trees.
   void clear() { version_ = 0; }
   const FixedTreesView& view() const { return view_; }
+  /// By mesh, in the order of their sub-shapes.
+  const detail::MeshView* meshes() const { return meshes_; }
 
  private:
-  template <class T>
-  using Buffer = typename Device::template Buffer<T>;
-  struct Tree {
-    Buffer<TreeBlock> blocks;
-    Buffer<std::uint32_t> items;
-    BlockTreeView upload(const Transfer<Device>& transfer, BlockTreeView tree) {
-      transfer.put(&items, tree.items, std::size_t{tree.leaf_blocks} * TreeBlock::kWidth);
-      transfer.put(&blocks, tree.blocks, tree.block_count);
-      tree.items = items.data();
-      tree.blocks = blocks.data();
-      return tree;
-    }
-  };
-
-  Tree immovable_, kinematic_;
+  BlockTreeBuffers<Device> immovable_, kinematic_;
+  MeshBuffers<Device> mesh_buffers_;
+  const detail::MeshView* meshes_ = nullptr;
   FixedTreesView view_;
   std::uint64_t version_ = 0;  ///< BodyStore::fixed_version() of the trees; 0: none
   // On the host, during upload().

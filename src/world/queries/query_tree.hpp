@@ -3,12 +3,9 @@
 
 #include <jfpx/query.hpp>
 
-#include "src/collide/block_tree.hpp"
-#include "src/collide/bounding_sphere.hpp"
+#include "src/collide/tree_traversal.hpp"
 #include "src/world/bodies/body_store.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -25,15 +22,13 @@ inline namespace JFPX_ABI {
 ///   - Rays: if the exact test returns a distance t, the point origin + t direction is inside the
 ///     bounds, with an error of at most 50 u D for a sphere (the distance from the line and the
 ///     half chord are rounded), and at most 300 u D for a box (the rotation of a part of a compound
-///     differs from an orthonormal matrix by up to 140 u). The slab test adds less than 16 u D, by
-///     its own rounding and by the lower limit of the direction. The margin is 512 u D.
+///     differs from an orthonormal matrix by up to 140 u).
 ///   - Overlaps: all errors are proportional to D + R, where R is the largest half extent of the
 ///     query. The largest one is that of two boxes with nearly parallel edges: collide() may report
 ///     them as touching if their gap along the common normal is below 2 sqrt(epsilon) times the sum
 ///     of the half diagonals. Their distance is at most sqrt(3) times that gap, which gives
-///     6 sqrt(epsilon) (D + R). The margin is at least 22 sqrt(epsilon) (D + R).
-///   - kLostLength exceeds all lengths that are lost because their squares are denormal.
-/// D of a node, and therefore its margin, is at least that of its children.
+///     6 sqrt(epsilon) (D + R).
+/// TreeTraversal has the margins.
 class QueryTree {
  public:
   /// Replaces the contents by all bodies, in O(n) time. Memory is kept for the next call.
@@ -45,129 +40,20 @@ class QueryTree {
   /// @param ray with a direction of length 1
   template <class Visit>
   void visit_along(const Ray& ray, const Visit& visit) const {
-    traverse(SlabTest(ray.origin, ray.direction), ray.max_distance, visit);
+    Real limit = ray.max_distance;
+    for (const std::uint32_t wall : walls_) limit = visit(wall);
+    TreeTraversal::visit_along(tree_.view(), ray.origin, ray.direction, limit, visit);
   }
 
-  /// Calls visit(body) for each body that a solid with the given bounds may touch.
+  /// Calls visit(body) for the walls, and for each body that a solid with the given bounds may
+  /// touch.
   template <class Visit>
   void visit_around(const Vec3& centre, const Vec3& half_extents, const Visit& visit) const {
-    traverse(OverlapTest{centre, half_extents}, 0, [&visit](std::uint32_t body) {
-      visit(body);
-      return Real(0);
-    });
+    for (const std::uint32_t wall : walls_) visit(wall);
+    TreeTraversal::visit_around(tree_.view(), centre, half_extents, visit);
   }
 
  private:
-  static constexpr std::uint32_t kWidth = TreeBlock::kWidth;
-  using Lanes = std::array<Real, kWidth>;
-
-  /// Distance at which a ray enters each lane. The margin makes the test conservative; see above.
-  struct SlabTest {
-    SlabTest(const Vec3& from, const Vec3& direction) : origin(from) {
-      for (int i = 0; i < 3; ++i) {
-        // The lower limit keeps the reciprocal, and all products with it, finite. It moves the
-        // points of a ray in a node by less than 2 D epsilon^2.
-        const Real size = std::max(absolute(direction[i]), kEpsilon * kEpsilon);
-        descends[i] = direction[i] < 0;
-        inverse[i] = Real(1) / (descends[i] ? -size : size);
-      }
-    }
-
-    /// @return a lane is hit if entry <= exit
-    void operator()(const TreeBlock& block, Real limit, Lanes& entry, Lanes& exit) const {
-      Lanes near[3], far[3], size{};
-      for (int i = 0; i < 3; ++i) {
-        const Real* const first = descends[i] ? block.upper[i] : block.lower[i];
-        const Real* const last = descends[i] ? block.lower[i] : block.upper[i];
-        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-          near[i][lane] = first[lane] - origin[i];
-          far[i][lane] = last[lane] - origin[i];
-          const Real a = absolute(near[i][lane]), b = absolute(far[i][lane]);
-          const Real larger = a > b ? a : b;
-          size[lane] = larger > size[lane] ? larger : size[lane];
-        }
-      }
-      entry.fill(0);
-      exit.fill(limit);
-      for (int i = 0; i < 3; ++i) {
-        const Real k = inverse[i], steepness = absolute(k);
-        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-          const Real margin = (size[lane] * (256 * kEpsilon) + detail::kLostLength) * steepness;
-          const Real enters = near[i][lane] * k - margin, leaves = far[i][lane] * k + margin;
-          entry[lane] = enters > entry[lane] ? enters : entry[lane];
-          exit[lane] = leaves < exit[lane] ? leaves : exit[lane];
-        }
-      }
-    }
-
-    Vec3 origin, inverse;
-    bool descends[3] = {};
-  };
-
-  /// Overlap of a box with each lane, with the margin of the comment above.
-  struct OverlapTest {
-    void operator()(const TreeBlock& block, Real, Lanes& entry, Lanes& exit) const {
-      constexpr Real kMargin = sizeof(Real) == 4 ? Real(0x1p-7) : Real(0x1p-21);
-      const Real reach = std::max({half_extents.x, half_extents.y, half_extents.z});
-      Lanes size, gap;
-      size.fill(reach);
-      gap.fill(-reach);
-      for (int i = 0; i < 3; ++i) {
-        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-          const Real a = block.lower[i][lane] - centre[i], b = centre[i] - block.upper[i][lane];
-          const Real nearer = (a > b ? a : b) - half_extents[i];
-          gap[lane] = nearer > gap[lane] ? nearer : gap[lane];
-          const Real c = absolute(a), d = absolute(b), larger = c > d ? c : d;
-          size[lane] = larger + reach > size[lane] ? larger + reach : size[lane];
-        }
-      }
-      exit.fill(0);
-      for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-        entry[lane] = gap[lane] - (size[lane] * kMargin + detail::kLostLength);
-      }
-    }
-
-    Vec3 centre, half_extents;
-  };
-
-  /// Depth first, nearest block first.
-  template <class Test, class Visit>
-  void traverse(const Test& test, Real limit, const Visit& visit) const {
-    for (const std::uint32_t wall : walls_) limit = visit(wall);
-    const BlockTreeView tree = tree_.view();
-    if (tree.block_count == 0) return;
-    struct Entry {
-      Real distance;
-      std::uint32_t block;
-    };
-    std::array<Entry, BlockTreeView::kMostWaiting> stack;
-    std::size_t count = 0;
-    stack[count++] = {0, tree.block_count - 1};
-    Lanes entry, exit;
-    while (count > 0) {
-      const Entry next = stack[--count];
-      if (next.distance > limit) continue;
-      test(tree.blocks[next.block], limit, entry, exit);
-      if (next.block < tree.leaf_blocks) {
-        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-          if (!(entry[lane] <= exit[lane]) || entry[lane] > limit) continue;
-          limit = visit(tree.items[next.block * kWidth + lane]);
-        }
-        continue;
-      }
-      const std::size_t base = count;
-      const std::uint32_t first_child = (next.block - tree.leaf_blocks) * kWidth;
-      for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-        if (!(entry[lane] <= exit[lane])) continue;
-        std::size_t slot = count++;
-        for (; slot > base && stack[slot - 1].distance < entry[lane]; --slot) {
-          stack[slot] = stack[slot - 1];
-        }
-        stack[slot] = {entry[lane], first_child + lane};
-      }
-    }
-  }
-
   std::vector<std::uint32_t> walls_;  ///< bodies without bounds
   BlockTree tree_;                    ///< of all other bodies
   // During build(): the bodies of the tree.

@@ -17,6 +17,9 @@ void serialize(auto& archive, Is<Vec3> auto& v) { archive(v.x, v.y, v.z); }
 void serialize(auto& archive, Is<Quat> auto& q) { archive(q.w, q.x, q.y, q.z); }
 void serialize(auto& archive, Is<Mat3> auto& m) { archive(m.row[0], m.row[1], m.row[2]); }
 
+void serialize(auto& archive, Is<Triangle> auto& triangle) {
+  archive(triangle[0], triangle[1], triangle[2]);
+}
 void serialize(auto& archive, Is<BodyId> auto& id) {
   auto& [index, generation] = id;
   archive(index, generation);

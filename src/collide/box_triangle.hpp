@@ -1,0 +1,292 @@
+/// Box-triangle collision: the separating-axis test over 13 axes (Akenine-Moeller 2001), and the
+/// contact points by clipping face against face (Sutherland and Hodgman 1974) or from the closest
+/// points of two edges. The normal of a contact is the best axis that is a proximal normal of the
+/// mesh: see mesh_triangle.hpp.
+#pragma once
+
+#include "src/collide/box_pair.hpp"
+#include "src/collide/mesh_triangle.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+/// A triangle in the axes of a box, whose centre is the origin.
+struct BoxTriangle {
+  Vec3 half;
+  Vec3 corner[3];  ///< [m]
+  Vec3 normal;     ///< unit, to the side of the box
+  std::uint32_t flat_edges = 0;
+  Real size = 0;  ///< [m], the scale of the rounding errors
+
+  JFPX_HD Vec3 edge(int k) const { return corner[next_corner(k)] - corner[k]; }
+};
+
+/// @param shift [m], world axes, motion of the box since the start of the step
+JFPX_HD inline BoxTriangle make_box_triangle(const Box& box, const Mat3& axes,
+                                             const TriangleInstance& triangle, const Vec3& shift) {
+  BoxTriangle result;
+  result.half = box.half_extents;
+  result.normal = transform_transpose(axes, triangle.normal);
+  result.flat_edges = triangle.triangle->flat_edges;
+  Real farthest = 0;
+  for (int k = 0; k < 3; ++k) {
+    result.corner[k] = transform_transpose(axes, triangle.corner[k] - shift);
+    const Real distance = length(result.corner[k]);
+    farthest = distance > farthest ? distance : farthest;
+  }
+  result.size = length(box.half_extents) + farthest;
+  return result;
+}
+
+/// The axes of a box and a triangle: 0 is the normal of the triangle, 1 + i is axis i of the box,
+/// and 4 + 3 i + k is the cross product of that axis and edge k of the triangle.
+inline constexpr int kBoxAxis = 1, kEdgeAxis = 4;
+
+/// Distance of the box from the triangle along an axis.
+/// @param axis unit
+JFPX_HD inline LeastOverlap overlap_along(const BoxTriangle& pair, int index, const Vec3& axis,
+                                          Real error) {
+  const Real half = projected_half_length(pair.half, axis);
+  const Real p = dot(axis, pair.corner[0]), q = dot(axis, pair.corner[1]),
+             r = dot(axis, pair.corner[2]);
+  const Real lower = p < q ? p : q, upper = p < q ? q : p;
+  const Real above = (r < lower ? r : lower) - half, below = -(r > upper ? r : upper) - half;
+  if (above > below) return {index, above, error, -axis};
+  return {index, below, error, axis};
+}
+JFPX_HD inline LeastOverlap overlap_along_normal(const BoxTriangle& pair) {
+  const Real height = -dot(pair.normal, pair.corner[0]);
+  return {0, height - projected_half_length(pair.half, pair.normal), 8 * kEpsilon * pair.size,
+          pair.normal};
+}
+
+/// Calls visit(overlap) for all axes except the normal of the triangle. Edges that are nearly
+/// parallel have no axis: see least_overlap().
+template <class Visit>
+JFPX_HD void for_each_axis(const BoxTriangle& pair, const Visit& visit) {
+  const Real error = 8 * kEpsilon * pair.size;
+  for (int i = 0; i < 3; ++i) visit(overlap_along(pair, kBoxAxis + i, unit_axis(i), error));
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 edge = pair.edge(k);
+    const Real size2 = length_squared(edge);
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 axis = cross(unit_axis(i), edge);
+      const Real across2 = length_squared(axis);
+      if (!(across2 > 4 * kEpsilon * size2)) continue;
+      const Real scale = Real(1) / square_root(across2);
+      visit(overlap_along(pair, kEdgeAxis + 3 * i + k, axis * scale,
+                          error * (square_root(size2) * scale)));
+    }
+  }
+}
+
+/// False if an axis separates the shapes by more than `limit`. Otherwise writes the axis of the
+/// largest separation, or of least overlap.
+JFPX_HD inline bool widest_separation(const BoxTriangle& pair, Real limit, LeastOverlap* widest) {
+  *widest = overlap_along_normal(pair);
+  if (widest->distance > limit) return false;
+  bool is_near = true;
+  for_each_axis(pair, [&](const LeastOverlap& overlap) {
+    if (overlap.distance > widest->distance) *widest = overlap;
+    if (overlap.distance > limit) is_near = false;
+  });
+  return is_near;
+}
+
+/// The feature of the triangle that is closest to the box along the normal of an overlap.
+JFPX_HD inline int supporting_feature(const BoxTriangle& pair, const LeastOverlap& overlap) {
+  Real height[3];
+  for (int k = 0; k < 3; ++k) height[k] = dot(overlap.normal, pair.corner[k]);
+  Real most = height[0];
+  for (int k = 1; k < 3; ++k) most = height[k] > most ? height[k] : most;
+  const Real tolerance = 8 * overlap.error;
+  int count = 0, top = 0, below = 0;
+  for (int k = 0; k < 3; ++k) {
+    const bool supports = height[k] >= most - tolerance;
+    count += supports ? 1 : 0;
+    (supports ? top : below) = k;
+  }
+  if (count == 3) return kFace;
+  return count == 2 ? kEdge + next_corner(below) : kVertex + top;
+}
+
+/// Whether the box is closer to the face of a neighbor at a convex edge, which then has the
+/// contact, than to the face of the triangle.
+JFPX_HD inline bool is_nearer_to_neighbor(const BoxTriangle& pair, const TriangleInstance& triangle,
+                                          const Mat3& axes, const LeastOverlap& normal) {
+  bool is_nearer = false;
+  triangle.visit_convex_neighbors([&](const Vec3& n) {
+    const Vec3 axis = transform_transpose(axes, n);
+    Real most = -kMaxReal;
+    for (int k = 0; k < 3; ++k) {
+      const Real height = dot(axis, pair.corner[k]);
+      most = height > most ? height : most;
+    }
+    LeastOverlap neighbor{0, -most - projected_half_length(pair.half, axis), normal.error, axis};
+    is_nearer |= &preferred(normal, neighbor) == &neighbor;
+  });
+  return is_nearer;
+}
+
+/// The axis of the contact: that of least overlap among the proximal normals of the mesh. The
+/// normal of the triangle is preferred to axes of the box, and these to edges; axes within a degree
+/// of the normal of the triangle do not replace it, so that a box that rests on a flat mesh has the
+/// same normal on all triangles.
+JFPX_HD inline LeastOverlap contact_axis(const BoxTriangle& pair, const TriangleInstance& triangle,
+                                         const Mat3& axes) {
+  const LeastOverlap normal = overlap_along_normal(pair);
+  constexpr Real kParallelCosine = Real(0.9998);
+  LeastOverlap faces, edges;
+  for_each_axis(pair, [&](const LeastOverlap& overlap) {
+    LeastOverlap* best = overlap.axis < kEdgeAxis ? &faces : &edges;
+    if (best->axis >= 0 && !(overlap.distance > best->distance)) return;
+    if (!(overlap.distance > normal.distance)) return;
+    const Real cosine = dot(overlap.normal, pair.normal);
+    const int feature = supporting_feature(pair, overlap);
+    if (cosine > kParallelCosine || (feature == kFace && cosine < 0)) return;
+    if (triangle.is_proximal(feature, axes * overlap.normal)) *best = overlap;
+  });
+  return preferred(preferred(normal, faces), edges);
+}
+
+/// Whether an overlap along the normal of the triangle is that of a contact. The best axis may be
+/// no proximal normal: a neighbor is closer to the box in this direction. If the shapes are
+/// separated, the triangle has no contact then.
+JFPX_HD inline bool is_contact(const BoxTriangle& pair, const TriangleInstance& triangle,
+                               const Mat3& axes, const LeastOverlap& chosen,
+                               const LeastOverlap& widest) {
+  if (&preferred(chosen, widest) == &chosen) return true;
+  if (widest.distance > 0 && chosen.distance < 0) return false;
+  return chosen.axis != 0 || !is_nearer_to_neighbor(pair, triangle, axes, chosen);
+}
+
+/// The part of a polygon where dot(normal, p) <= limit.
+/// @param corners bit i: corner i of the polygon is a corner of the clipped face; updated
+/// @param plane   number of the edge along the clipping plane
+JFPX_HD inline Polygon clipped(const Polygon& polygon, const Vec3& normal, Real limit, int plane,
+                               std::uint32_t* corners) {
+  Polygon result;
+  std::uint32_t kept = 0;
+  for (int i = 0; i < polygon.count; ++i) {
+    const Vec3& from = polygon.corner[i];
+    const Vec3& to = polygon.corner[i + 1 == polygon.count ? 0 : i + 1];
+    const Real d_from = dot(normal, from) - limit, d_to = dot(normal, to) - limit;
+    const int edge = polygon.edge[i];
+    if (d_from <= 0) {
+      kept |= (*corners >> i & 1) << result.count;
+      result.add(from, d_from < 0 || d_to <= 0 ? edge : plane);
+    }
+    if ((d_from < 0 && d_to > 0) || (d_from > 0 && d_to < 0)) {
+      result.add(add_scaled(from, to - from, d_from / (d_from - d_to)), d_from < 0 ? plane : edge);
+    }
+  }
+  *corners = kept;
+  return result;
+}
+
+/// Clips the incident face of the box against the sides of the triangle. Of points on an edge whose
+/// neighbor is in the same plane, only corners of the box are kept: the others are inside the
+/// polygon that the box and the plane have in common.
+/// @param manifold receives the points, in the axes of the box
+JFPX_HD inline void points_on_triangle(const BoxTriangle& pair, Real margin, Manifold* manifold) {
+  constexpr int kPlanes = 4;  // edges from here on lie in the sides of the triangle
+  int incident = 0;
+  Polygon polygon = facing_quad(pair.half, Mat3{}, {}, pair.normal, &incident);
+  std::uint32_t corners = 0xf;
+  for (int k = 0; k < 3; ++k) {
+    Vec3 outward = cross(pair.edge(k), pair.normal);
+    const Vec3& third = pair.corner[next_corner(next_corner(k))];
+    if (dot(outward, third - pair.corner[k]) > 0) outward = -outward;
+    // A corner exactly above the edge must not be lost by rounding.
+    const bool is_flat = (pair.flat_edges >> k & 1) != 0;
+    const Real slack = is_flat ? 8 * kEpsilon * pair.size * length(outward) : Real(0);
+    polygon =
+        clipped(polygon, outward, dot(outward, pair.corner[k]) + slack, kPlanes + k, &corners);
+  }
+  const auto is_flat = [&](int edge) {
+    return edge >= kPlanes && (pair.flat_edges >> (edge - kPlanes) & 1) != 0;
+  };
+  for (int i = 0; i < polygon.count; ++i) {
+    const int before = polygon.edge[i == 0 ? polygon.count - 1 : i - 1], after = polygon.edge[i];
+    if ((corners >> i & 1) == 0 && (is_flat(before) || is_flat(after))) continue;
+    const Vec3& p = polygon.corner[i];
+    const Real distance = dot(pair.normal, p - pair.corner[0]);
+    if (!(distance <= margin)) continue;
+    manifold->points[manifold->count++] = {
+        add_scaled(p, pair.normal, distance * Real(-0.5)), distance,
+        static_cast<std::uint32_t>(64 * incident + 8 * before + after)};
+  }
+}
+
+/// Clips the triangle against the sides of a face of the box.
+JFPX_HD inline void points_on_box(const BoxTriangle& pair, int face, Real side, Real margin,
+                                  Manifold* manifold) {
+  Polygon polygon;
+  for (int k = 0; k < 3; ++k) polygon.add(pair.corner[k], k);
+  for (int k = 1; k < 3; ++k) {
+    const int axis = (face + k) % 3;
+    polygon = clipped(polygon, axis, 1, pair.half[axis], 2 * k + 2);
+    polygon = clipped(polygon, axis, -1, pair.half[axis], 2 * k + 3);
+  }
+  const Vec3 outward = unit_axis(face) * side;
+  for (int i = 0; i < polygon.count; ++i) {
+    const Real distance = side * polygon.corner[i][face] - pair.half[face];
+    if (!(distance <= margin)) continue;
+    const int before = polygon.edge[i == 0 ? polygon.count - 1 : i - 1];
+    manifold->points[manifold->count++] = {
+        add_scaled(polygon.corner[i], outward, distance * Real(-0.5)), distance,
+        static_cast<std::uint32_t>(64 * (2 * face + (side > 0 ? 0 : 1)) + 8 * before +
+                                   polygon.edge[i])};
+  }
+}
+
+/// The midpoint between the closest points of an edge of the box and an edge of the triangle, which
+/// are not parallel (Goldman 1990).
+JFPX_HD inline Vec3 edge_point(const BoxTriangle& pair, int i, int k, const LeastOverlap& least) {
+  const auto clamp = [](Real x, Real lower, Real upper) {
+    return x > upper ? upper : x < lower ? lower : x;
+  };
+  const Vec3 dir_a = unit_axis(i), dir_b = pair.edge(k);
+  Vec3 on_a = support(pair.half, Mat3{}, {}, -least.normal);
+  on_a[i] = 0;
+  const Vec3 across = pair.corner[k] - on_a, common = cross(dir_a, dir_b);
+  const Real scale = Real(1) / length_squared(common);
+  const Real s = clamp(dot(cross(across, dir_b), common) * scale, -pair.half[i], pair.half[i]);
+  const Real t = clamp(dot(cross(across, dir_a), common) * scale, 0, 1);
+  return (add_scaled(on_a, dir_a, s) + add_scaled(pair.corner[k], dir_b, t)) * Real(0.5);
+}
+
+/// The contact manifold of a box and a triangle, in the axes of the box. The normal points from the
+/// triangle to the box.
+/// @param widest widest_separation()
+/// @param margin largest distance of a point of the manifold
+JFPX_HD inline Manifold triangle_manifold(const BoxTriangle& pair, const TriangleInstance& triangle,
+                                          const Mat3& axes, const LeastOverlap& widest,
+                                          Real margin) {
+  constexpr std::uint32_t kFeaturesOfFace = 6 * 64;
+  const LeastOverlap least = contact_axis(pair, triangle, axes);
+  Manifold manifold;
+  if (!is_contact(pair, triangle, axes, least, widest)) return manifold;
+  manifold.distance = least.distance;
+  manifold.normal = least.normal;
+  std::uint32_t first_feature = 0;
+  if (least.axis == 0) {
+    points_on_triangle(pair, margin, &manifold);
+  } else if (least.axis < kEdgeAxis) {
+    first_feature = kFeaturesOfFace;
+    const int face = least.axis - kBoxAxis;
+    points_on_box(pair, face, least.normal[face] > 0 ? Real(-1) : Real(1), margin, &manifold);
+  } else if (least.distance <= margin) {
+    first_feature = 2 * kFeaturesOfFace;
+    const int edges = least.axis - kEdgeAxis;
+    manifold.points[manifold.count++] = {edge_point(pair, edges / 3, edges % 3, least),
+                                         least.distance, static_cast<std::uint32_t>(edges)};
+  }
+  for (int i = 0; i < manifold.count; ++i) manifold.points[i].feature += first_feature;
+  return manifold;
+}
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx
