@@ -2,6 +2,7 @@
 /// documented otherwise.
 #pragma once
 
+#include <jfpx/hull.hpp>
 #include <jfpx/math.hpp>
 #include <jfpx/triangle_mesh.hpp>
 
@@ -48,12 +49,12 @@ struct Plane {
 };
 
 /// The shapes that have a volume, and that can be parts of compounds.
-using SolidShape = std::variant<Sphere, Box, Capsule>;
+using SolidShape = std::variant<Sphere, Box, Capsule, Hull>;
 
 /// A solid of a compound, with its pose in the axes of the body.
 struct CompoundPart {
   SolidShape shape = Sphere{};
-  Vec3 position = {};  ///< [m], body axes, centre of the part
+  Vec3 position = {};  ///< [m], body axes, origin of the part
   Quat orientation = {};
   Real density = 1;  ///< [-], in (0, 1e9], relative to the other parts
   friend bool operator==(const CompoundPart&, const CompoundPart&) = default;
@@ -72,7 +73,7 @@ struct Compound {
 /// @param compound each part must be in the ranges that validate() requires
 JFPX_API Compound centred(Compound compound);
 
-using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh>;
+using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh, Hull>;
 
 /// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

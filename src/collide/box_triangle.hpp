@@ -94,18 +94,28 @@ JFPX_HD inline bool widest_separation(const BoxTriangle& pair, Real limit, Least
   return is_near;
 }
 
-/// The feature of the triangle that is closest to the box along the normal of an overlap.
-JFPX_HD inline int supporting_feature(const BoxTriangle& pair, const LeastOverlap& overlap) {
+/// Axes within a degree of each other form the same contact.
+JFPX_HD inline bool are_parallel(const Vec3& a, const Vec3& b) {
+  constexpr Real kParallelCosine = Real(0.9998);
+  return dot(a, b) > kParallelCosine;
+}
+
+/// The feature of a triangle that is closest to a solid along the normal of an overlap. An edge
+/// within a degree of a right angle to the normal is closest with both ends: a solid rests on it
+/// with a face.
+JFPX_HD inline int supporting_feature(const Vec3 (&corner)[3], const LeastOverlap& overlap) {
   Real height[3];
-  for (int k = 0; k < 3; ++k) height[k] = dot(overlap.normal, pair.corner[k]);
-  Real most = height[0];
-  for (int k = 1; k < 3; ++k) most = height[k] > most ? height[k] : most;
-  const Real tolerance = 8 * overlap.error;
-  int count = 0, top = 0, below = 0;
+  for (int k = 0; k < 3; ++k) height[k] = dot(overlap.normal, corner[k]);
+  constexpr Real kSine = Real(0.02);
+  int top = 0;
+  for (int k = 1; k < 3; ++k) top = height[k] > height[top] ? k : top;
+  int count = 0, below = 0;
   for (int k = 0; k < 3; ++k) {
-    const bool supports = height[k] >= most - tolerance;
+    const Real drop = height[top] - height[k], error = 8 * overlap.error;
+    const bool supports =
+        drop <= error || drop * drop <= kSine * kSine * length_squared(corner[top] - corner[k]);
     count += supports ? 1 : 0;
-    (supports ? top : below) = k;
+    if (!supports) below = k;
   }
   if (count == 3) return kFace;
   return count == 2 ? kEdge + next_corner(below) : kVertex + top;
@@ -136,15 +146,15 @@ JFPX_HD inline bool is_nearer_to_neighbor(const BoxTriangle& pair, const Triangl
 JFPX_HD inline LeastOverlap contact_axis(const BoxTriangle& pair, const TriangleInstance& triangle,
                                          const Mat3& axes) {
   const LeastOverlap normal = overlap_along_normal(pair);
-  constexpr Real kParallelCosine = Real(0.9998);
   LeastOverlap faces, edges;
   for_each_axis(pair, [&](const LeastOverlap& overlap) {
     LeastOverlap* best = overlap.axis < kEdgeAxis ? &faces : &edges;
     if (best->axis >= 0 && !(overlap.distance > best->distance)) return;
     if (!(overlap.distance > normal.distance)) return;
-    const Real cosine = dot(overlap.normal, pair.normal);
-    const int feature = supporting_feature(pair, overlap);
-    if (cosine > kParallelCosine || (feature == kFace && cosine < 0)) return;
+    if (are_parallel(overlap.normal, pair.normal)) return;
+    if (best == &edges && faces.axis >= 0 && are_parallel(overlap.normal, faces.normal)) return;
+    const int feature = supporting_feature(pair.corner, overlap);
+    if (feature == kFace && dot(overlap.normal, pair.normal) < 0) return;
     if (triangle.is_proximal(feature, axes * overlap.normal)) *best = overlap;
   });
   return preferred(preferred(normal, faces), edges);
@@ -157,6 +167,7 @@ JFPX_HD inline bool is_contact(const BoxTriangle& pair, const TriangleInstance& 
                                const Mat3& axes, const LeastOverlap& chosen,
                                const LeastOverlap& widest) {
   if (&preferred(chosen, widest) == &chosen) return true;
+  if (are_parallel(chosen.normal, widest.normal)) return true;
   if (widest.distance > 0 && chosen.distance < 0) return false;
   return chosen.axis != 0 || !is_nearer_to_neighbor(pair, triangle, axes, chosen);
 }

@@ -3,6 +3,7 @@
 
 #include "src/collide/shapes/box.hpp"
 #include "src/collide/shapes/capsule.hpp"
+#include "src/collide/shapes/hull.hpp"
 #include "src/collide/shapes/plane.hpp"
 #include "src/collide/shapes/sphere.hpp"
 #include "src/collide/shapes/triangle_mesh.hpp"
@@ -25,12 +26,23 @@ JFPX_HD inline SphereInstance instance(const Sphere& sphere, const Transform& po
   return {pose.origin, sphere.radius};
 }
 
+/// [kg m^2], inertia tensor of a solid about its centre of mass, in its axes. The centre is the
+/// origin, except for a hull.
+template <class S>
+Mat3 central_inertia(const S& solid, Real mass) {
+  return diagonal(moments_of_inertia(solid, mass));
+}
+inline Mat3 central_inertia(const Hull& hull, Real mass) { return hull.central_inertia(mass); }
+
 /// [m], the point that decides on which side of a triangle a solid is.
 template <class S>
-JFPX_HD inline const Vec3& centre_of(const Posed<S>& solid) {
+JFPX_HD inline Vec3 centre_of(const Posed<S>& solid) {
   return solid.pose.origin;
 }
-JFPX_HD inline const Vec3& centre_of(const SphereInstance& sphere) { return sphere.centre; }
+JFPX_HD inline Vec3 centre_of(const Posed<HullReference>& solid) {
+  return transform_point(solid.pose, solid.shape.hull->centre);
+}
+JFPX_HD inline Vec3 centre_of(const SphereInstance& sphere) { return sphere.centre; }
 
 /// The contact of two solids. Each pair of kinds has one test, for one order of the kinds, in the
 /// header of a solid. A missing test is a compile error.

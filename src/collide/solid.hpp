@@ -16,10 +16,11 @@ template <class S>
 inline constexpr const char* kShapeName = nullptr;
 
 /// Dimensions of a solid. The core is a point, a segment along the y axis or a box; the solid
-/// consists of all points within `radius` of the core.
+/// consists of all points within `radius` of the core. A hull is inside its core.
 struct Solid {
-  Vec3 half_extents;  ///< [m], of the core
-  Real radius = 0;    ///< [m]
+  Vec3 half_extents;               ///< [m], of the core
+  Real radius = 0;                 ///< [m]
+  const HullView* hull = nullptr;  ///< of a hull, in the memory where the solid is
   friend bool operator==(const Solid&, const Solid&) = default;
 };
 

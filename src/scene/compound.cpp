@@ -29,13 +29,15 @@ MassProperties mass_properties(const Compound& compound, Real mass) {
   MassProperties sum{{}, diagonal({})};
   for_each_share(compound, [&](const CompoundPart& part, Real share) {
     const Real part_mass = mass * share;
-    const Vec3 moments =
-        std::visit([&](const auto& shape) { return detail::moments_of_inertia(shape, part_mass); },
-                   part.shape);
-    const Mat3 rotated =
-        detail::in_world_axes(diagonal(moments), to_matrix(normalized(part.orientation)));
-    sum.centre += part.position * share;
-    sum.inertia = sum.inertia + rotated + detail::parallel_axis(part.position, part_mass);
+    const Mat3 axes = to_matrix(normalized(part.orientation));
+    const auto add = [&]<class S>(const S& shape) {
+      Vec3 centre = part.position;
+      if constexpr (std::is_same_v<S, Hull>) centre += axes * shape.centre_of_mass();
+      const Mat3 rotated = detail::in_world_axes(detail::central_inertia(shape, part_mass), axes);
+      sum.centre += centre * share;
+      sum.inertia = sum.inertia + rotated + detail::parallel_axis(centre, part_mass);
+    };
+    std::visit(add, part.shape);
   });
   return sum;
 }

@@ -47,7 +47,7 @@ inline Mat3 solid_inertia(const Shape& shape, Real mass) {
     if constexpr (std::is_same_v<S, Compound>) {
       return mass_properties(s, mass).inertia;
     } else if constexpr (detail::kIsSolid<S>) {
-      return diagonal(detail::moments_of_inertia(s, mass));
+      return detail::central_inertia(s, mass);
     } else {
       return diagonal({});
     }

@@ -47,6 +47,8 @@ std::string find_solid_fault(const S& solid, Real mass) {
     const Real inertia = detail::moments_of_inertia(solid, mass).x;
     if (has_inverse(inertia)) return {};
     return fault("moment of inertia", inertia, "such that it and its inverse are finite");
+  } else if constexpr (std::is_same_v<S, Hull>) {
+    return find_moments_fault(principal_inertia(solid.central_inertia(mass)).moments);
   } else if constexpr (std::is_same_v<S, Compound>) {
     return find_moments_fault(principal_inertia(mass_properties(solid, mass).inertia).moments);
   } else if constexpr (detail::kIsSolid<S>) {
@@ -61,6 +63,13 @@ std::string find_centre_fault(const Compound& compound, Real mass) {
   if (length(centre) <= outer_radius(compound) * kUnitTolerance) return {};
   return fault("centre of mass of parts", centre,
                "the origin, to a thousandth of the body's radius; centred() moves it there");
+}
+
+std::string find_centre_fault(const Hull& hull) {
+  const Vec3 centre = hull.centre_of_mass();
+  if (length(centre) <= detail::outer_radius(hull) * kUnitTolerance) return {};
+  return fault("centre of mass of vertices", centre,
+               "the origin, to a thousandth of the hull's radius; centred() moves it there");
 }
 
 /// Checks conditions between several fields, each of which must be in its range.
@@ -87,9 +96,10 @@ std::string find_coupled_fault(const BodyDef& def) {
   }
   if (def.inertia) return find_inertia_fault(*def.inertia);
   if (def.mass > 0) found = find_inertia_fault(def.shape, def.mass);
+  if (!found.empty() || def.mass == 0) return found;
+  if (const auto* hull = std::get_if<Hull>(&def.shape)) return find_centre_fault(*hull);
   const auto* compound = std::get_if<Compound>(&def.shape);
-  if (!found.empty() || compound == nullptr || def.mass == 0) return found;
-  return find_centre_fault(*compound, def.mass);
+  return compound == nullptr ? found : find_centre_fault(*compound, def.mass);
 }
 
 std::string find_pair_fault(std::span<const BodyPair> ignored_pairs, std::uint64_t bodies) {

@@ -7,6 +7,7 @@
 
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -33,6 +34,23 @@ void each_field(Is<Plane> auto& plane, const auto& visit) {
   auto& [normal, offset] = plane;
   visit(required_field("normal", kUnitVector), normal);
   visit(required_field("offset", kInWorld), offset);
+}
+/// Without faces, the hull is that of the vertices. The constructor checks both.
+void each_field(Is<Hull> auto& hull, const auto& visit) {
+  std::vector<Vec3> vertices(hull.vertices().begin(), hull.vertices().end());
+  std::vector<std::vector<std::uint32_t>> faces;
+  for (const HullFace& face : hull.faces()) {
+    faces.emplace_back(hull.corners(face).begin(), hull.corners(face).end());
+  }
+  if constexpr (std::is_const_v<std::remove_reference_t<decltype(hull)>>) {
+    visit(required_field("vertices"), std::as_const(vertices));
+    visit(field("faces"), std::as_const(faces));
+  } else {
+    faces.clear();
+    visit(required_field("vertices"), vertices);
+    visit(field("faces"), faces);
+    hull = faces.empty() ? Hull(vertices) : Hull(vertices, faces);
+  }
 }
 /// The constructor of the mesh checks the vertices, and the indices of the triangles.
 void each_field(Is<TriangleMesh> auto& mesh, const auto& visit) {

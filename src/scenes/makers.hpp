@@ -14,6 +14,7 @@ Scene make_boxes_and_balls(const Counts& counts);
 Scene make_big_ballistic(const Counts& counts);
 Scene make_mixed(const Counts& counts);
 Scene make_capsules(const Counts& counts);
+Scene make_terrain(const Counts& counts);
 Scene make_bridge(const Counts& counts);
 Scene make_pile(const Counts& counts);
 Scene make_heap(const Counts& counts);

@@ -22,6 +22,8 @@ constexpr Entry kScenes[] = {
      Boxes::as_many_as_spheres, make_mixed},
     {"capsules", "balls, boxes, capsules and crosses of two capsules fall onto the ground", 40,
      Boxes::as_many_as_spheres, make_capsules},
+    {"terrain", "stones, balls, boxes and capsules fall into a hilly bowl of triangles", 60,
+     Boxes::none, make_terrain},
     {"bridge", "balls fall on a bridge of planks that ropes hold, with crates on ropes below", 36,
      Boxes::none, make_bridge},
     {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,

@@ -13,7 +13,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using CostJson = nlohmann::ordered_json;
 
 constexpr int kFormat = 2;
 constexpr const char* kFormatName = "jfpx_cost_model";
@@ -45,13 +45,13 @@ constexpr Term kTerms[] = {
     {"contact_ns", &CostTerms::contact_ns},
 };
 
-double read_cost(const Json& json, const char* name) {
-  const Json& value = json.at(name);
+double read_cost(const CostJson& json, const char* name) {
+  const CostJson& value = json.at(name);
   if (!value.is_number()) throw FileError(std::string(name) + " is not a number");
   return value.get<double>();
 }
 
-MeasuredCostModel from_json_value(const Json& json) {
+MeasuredCostModel from_json_value(const CostJson& json) {
   if (!json.is_object() || !json.contains(kFormatName)) throw FileError("is not a cost model");
   if (json[kFormatName] != kFormat) throw FileError("is a cost model in another format");
   if (json.at("precision") != kPrecision) throw FileError("has another precision");
@@ -61,7 +61,7 @@ MeasuredCostModel from_json_value(const Json& json) {
   json.at("version").get_to(model.origin.version);
   for (const Way& way : kWays) {
     const bool old = way.old_name != nullptr && json.contains(way.old_name);
-    const Json& terms = json.at(old ? way.old_name : way.name);
+    const CostJson& terms = json.at(old ? way.old_name : way.name);
     for (const Term& term : kTerms) {
       model.costs.*way.terms.*term.value = read_cost(terms, term.name);
     }
@@ -106,11 +106,11 @@ std::string find_fault(const CostModel& model) {
 }
 
 std::string to_json(const MeasuredCostModel& model) {
-  Json json = {{kFormatName, kFormat},
-               {"precision", kPrecision},
-               {"version", model.origin.version},
-               {"machine", model.origin.machine},
-               {"driver", model.origin.driver}};
+  CostJson json = {{kFormatName, kFormat},
+                   {"precision", kPrecision},
+                   {"version", model.origin.version},
+                   {"machine", model.origin.machine},
+                   {"driver", model.origin.driver}};
   for (const Way& way : kWays) {
     for (const Term& term : kTerms) {
       json[way.name][term.name] = model.costs.*way.terms.*term.value;
@@ -129,10 +129,10 @@ void save_cost_model(const MeasuredCostModel& model, const std::string& path) {
 MeasuredCostModel load_cost_model(const std::string& path) {
   const std::string text = read_file(path);
   try {
-    return from_json_value(Json::parse(text));
+    return from_json_value(CostJson::parse(text));
   } catch (const FileError& error) {
     throw FileError(path + ": " + error.what());
-  } catch (const Json::exception&) {
+  } catch (const CostJson::exception&) {
     throw FileError(path + ": is damaged JSON or an incomplete cost model");
   }
 }

@@ -36,22 +36,27 @@ BoundsEstimator::BoundsEstimator(const Scene& scene) {
     for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
       const BodyDef& body = scene.bodies[i];
       if ((body.mass > 0) != wanted || is_wall(body.shape)) continue;
-      largest_ = std::max(largest_, size_of(body.shape));
-      if (i % stride == 0) bodies_.push_back(static_cast<std::uint32_t>(i));
+      largest_ = std::max(largest_, reach_of(body.shape));
+      if (i % stride == 0) {
+        samples_.push_back({static_cast<std::uint32_t>(i), middle_of(body.shape)});
+      }
     }
-    if (!bodies_.empty()) break;
+    if (!samples_.empty()) break;
   }
 }
 
 Bounds BoundsEstimator::bounds(const std::vector<BodyState>& states) const {
   constexpr Bounds kNothing{{0, 1, 0}, 4};
-  if (bodies_.empty()) return kNothing;
+  if (samples_.empty()) return kNothing;
   Vec3 low, high;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<Real> along;
-    along.reserve(bodies_.size());
-    for (const std::uint32_t body : bodies_) {
-      const Real place = states[body].position[axis];
+    along.reserve(samples_.size());
+    for (const Sample& sample : samples_) {
+      const BodyState& state = states[sample.body];
+      const bool is_shifted = sample.middle != Vec3{};
+      const Vec3 middle = is_shifted ? to_world_point(state, sample.middle) : state.position;
+      const Real place = middle[axis];
       if (std::isfinite(place)) along.push_back(place);  // NaN has no order
     }
     if (along.empty()) return kNothing;

@@ -27,7 +27,11 @@ class BoundsEstimator {
   Bounds bounds(const std::vector<BodyState>& states) const;
 
  private:
-  std::vector<std::uint32_t> bodies_;
+  struct Sample {
+    std::uint32_t body;
+    Vec3 middle;  ///< of its shape, in body axes
+  };
+  std::vector<Sample> samples_;
   Real largest_ = 0;  ///< radius of the largest body [m]
 };
 

@@ -1,6 +1,8 @@
 /// Content of a picture: lists of instances in the layout of the GPU buffers.
 #include "src/viewer/drawing.hpp"
 
+#include "src/viewer/mesh_geometry.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -33,12 +35,13 @@ float distance_to(const BoxItem& item) {
 
 }  // namespace
 
-float Drawing::nearest_box() const {
+float Drawing::nearest_surface() const {
   float nearest = HUGE_VALF;
   for (const auto* items : {&boxes_, &glass_}) {
     for (const BoxItem& item : *items) nearest = std::min(nearest, distance_to(item));
   }
   for (const RoundedItem& item : rounded_) nearest = std::min(nearest, distance_to(item.box));
+  for (const PlacedMesh& placed : meshes_) nearest = std::min(nearest, placed.distance);
   return nearest;
 }
 
@@ -65,6 +68,23 @@ void Drawing::add_rounded(const Vec3& centre, const Vec3& half_extents, Real rad
                           const Quat& turn, Paint paint) {
   const Vec3 outer = half_extents + Vec3{radius, radius, radius};
   rounded_.push_back({box_item(centre, outer, turn, paint), static_cast<float>(radius)});
+}
+
+void Drawing::add_mesh(const TriangleMesh& mesh, const Vec3& position, const Quat& turn, Real cell,
+                       Paint paint) {
+  if (!has_surface(mesh)) return;
+  const Mat3 basis = to_matrix(turn);
+  const Vec3 centre = centre_of(mesh);
+  MeshItem item;
+  put(item.centre, position - eye_ + basis * centre);
+  put(item.turn, turn);
+  item.paint = paint;
+  for (int i = 0; i < 3; ++i) {
+    item.phase[i] = static_cast<float>(std::remainder(centre[i], cell * 100));
+  }
+  item.cell = static_cast<float>(cell);
+  const Vec3 eye = transform_transpose(basis, eye_ - position);
+  meshes_.push_back({mesh, item, static_cast<float>(distance_to(mesh, eye))});
 }
 
 void Drawing::add_line(const Vec3& from, const Vec3& to, Paint paint, float width,

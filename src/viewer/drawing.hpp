@@ -1,7 +1,10 @@
 /// Content of a picture: lists of instances in the layout of the GPU buffers.
 #pragma once
 
+#include <jfpx/triangle_mesh.hpp>
+
 #include "src/collide/shapes.hpp"
+#include "src/viewer/hull_mesh.hpp"
 
 #include <cstdint>
 #include <vector>
@@ -55,6 +58,14 @@ struct RoundedItem {
   BoxItem box;
   float radius;
 };
+/// A placed triangle mesh.
+struct MeshItem {
+  float centre[3];  ///< of the bounds of the mesh
+  float turn[4];
+  Paint paint;
+  float phase[3];  ///< coordinates of the centre in body axes, modulo 100 cells
+  float cell;      ///< distance of the lines of Pattern::wall [m]
+};
 struct LineItem {
   float from[3], to[3];
   std::uint8_t rgba[4];
@@ -66,6 +77,12 @@ struct GroundItem {
   float v[3], eye_v;
   Paint paint;
   float cell;  ///< [m]
+};
+
+struct PlacedMesh {
+  TriangleMesh mesh;
+  MeshItem item;
+  float distance;  ///< of its nearest triangle from the eye [m]
 };
 
 class ResidentSpheres;
@@ -89,12 +106,18 @@ class Drawing {
       add_sphere(centre, solid.radius, turn, paint);
     } else if constexpr (std::is_same_v<S, Box>) {
       add_box(centre, solid.half_extents, turn, paint);
+    } else if constexpr (std::is_same_v<S, Hull>) {
+      add_mesh(mesh_of(solid), centre, turn, 2 * solid.data().view.outer_radius, paint);
     } else {
       const jfpx::detail::Solid rounded = jfpx::detail::to_solid(solid);
       add_rounded(centre, rounded.half_extents, rounded.radius, turn, paint);
     }
   }
   void add_box(const Vec3& centre, const Vec3& half_extents, const Quat& turn, Paint paint);
+  /// Adds a triangle mesh. The drawing shares its data.
+  /// @param cell distance of lines on its surface [m]
+  void add_mesh(const TriangleMesh& mesh, const Vec3& position, const Quat& turn, Real cell,
+                Paint paint);
   void add_line(const Vec3& from, const Vec3& to, Paint paint, float width,
                 std::uint8_t alpha = 255);
   /// Adds the plane dot(normal, p) = offset with a grid; it is invisible from below.
@@ -111,9 +134,11 @@ class Drawing {
   const std::vector<BoxItem>& boxes() const { return boxes_; }
   const std::vector<BoxItem>& glass() const { return glass_; }
   const std::vector<RoundedItem>& rounded() const { return rounded_; }
-  /// Distance of the nearest box, including glass and rounded boxes, from the eye [m]; infinite
-  /// without boxes.
-  float nearest_box() const;
+  /// Meshes that have a surface.
+  const std::vector<PlacedMesh>& meshes() const { return meshes_; }
+  /// Distance of the nearest box or triangle, including glass and rounded boxes, from the eye [m];
+  /// infinite without any.
+  float nearest_surface() const;
   const std::vector<LineItem>& lines() const { return lines_; }
   const std::vector<GroundItem>& grounds() const { return grounds_; }
   ResidentSpheres* resident() const { return resident_; }
@@ -129,6 +154,7 @@ class Drawing {
   std::vector<SphereItem> spheres_;
   std::vector<BoxItem> boxes_, glass_;
   std::vector<RoundedItem> rounded_;
+  std::vector<PlacedMesh> meshes_;
   std::vector<LineItem> lines_;
   std::vector<GroundItem> grounds_;
   ResidentSpheres* resident_ = nullptr;

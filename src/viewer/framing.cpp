@@ -1,11 +1,14 @@
 /// Initial position of the camera.
 #include "src/viewer/framing.hpp"
 
+#include "src/collide/mesh_queries.hpp"
 #include "src/viewer/scene_painter.hpp"
 #include "src/viewer/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -33,6 +36,28 @@ Real distance_for(const Camera& camera, const Bounds& bounds, const Scene& scene
   return std::max(*std::max_element(needed.begin(), needed.end()), bounds.radius / 2) * kMargin;
 }
 
+/// Share of the movable bodies that no mesh hides from the eye, from a sample of them. The rays
+/// start at the bodies, because only they are in front of one-sided meshes for certain.
+Real visible_share(const Vec3& eye, const Bounds& bounds, const Scene& scene,
+                   const RunState& run_state, const std::vector<std::size_t>& meshes) {
+  constexpr std::size_t kRays = 64;
+  const std::size_t stride = std::max(scene.bodies.size() / kRays, std::size_t{1});
+  std::size_t sampled = 0, visible = 0;
+  for (std::size_t i = 0; i < scene.bodies.size(); i += stride) {
+    const Vec3& from = run_state.states[i].position;
+    if (!(scene.bodies[i].mass > 0) || !(length(from - bounds.centre) <= bounds.radius)) continue;
+    const bool hidden = std::ranges::any_of(meshes, [&](std::size_t k) {
+      const auto& mesh = std::get<TriangleMesh>(scene.bodies[k].shape);
+      return jfpx::detail::enter(from, normalized(eye - from), mesh, pose(run_state.states[k]),
+                                 length(eye - from))
+          .hit;
+    });
+    ++sampled;
+    visible += hidden ? 0 : 1;
+  }
+  return sampled == 0 ? 1 : static_cast<Real>(visible) / static_cast<Real>(sampled);
+}
+
 }  // namespace
 
 Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunState& run_state) {
@@ -51,10 +76,33 @@ Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunS
   }
   const Real aspect =
       static_cast<Real>(options.size.width) / static_cast<Real>(options.size.height);
-  const Vec3 from = normalized(Vec3{Real(0.55), Real(0.36), Real(0.95)});
-  camera.look_at(bounds.centre + from, bounds.centre);
-  camera.look_at(bounds.centre + from * distance_for(camera, bounds, scene, run_state, aspect),
+  const auto from_height = [&](Real height) {
+    Camera high;
+    const Vec3 from = normalized(Vec3{Real(0.55), height, Real(0.95)});
+    high.look_at(bounds.centre + from, bounds.centre);
+    high.look_at(bounds.centre + from * distance_for(high, bounds, scene, run_state, aspect),
                  bounds.centre);
+    return high;
+  };
+  camera = from_height(Real(0.36));
+  std::vector<std::size_t> meshes;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    if (std::holds_alternative<TriangleMesh>(scene.bodies[i].shape)) meshes.push_back(i);
+  }
+  if (meshes.empty()) return camera;
+  const auto share = [&](const Camera& from) {
+    return visible_share(from.eye(), bounds, scene, run_state, meshes);
+  };
+  Real most = share(camera);
+  for (const Real height : {Real(0.6), Real(1), Real(1.8), Real(4)}) {
+    if (most >= Real(0.8)) break;
+    const Camera high = from_height(height);
+    const Real visible = share(high);
+    if (visible > most) {
+      most = visible;
+      camera = high;
+    }
+  }
   return camera;
 }
 

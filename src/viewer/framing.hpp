@@ -9,7 +9,9 @@ inline namespace JFPX_ABI {
 namespace view {
 
 /// A camera that shows all movable bodies from the front, the right and above, or only the lower
-/// part of a tower that is too tall for visible bodies. --eye and --target take precedence.
+/// part of a tower that is too tall for visible bodies. It is higher where meshes would hide
+/// bodies.
+/// --eye and --target take precedence.
 Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunState& run_state);
 
 }  // namespace view

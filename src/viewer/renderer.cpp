@@ -7,6 +7,7 @@
 #include "src/viewer/draw_order.hpp"
 #include "src/viewer/frame_block.hpp"
 #include "src/viewer/instances.hpp"
+#include "src/viewer/mesh_models.hpp"
 #include "src/viewer/resident_spheres.hpp"
 #include "src/viewer/shaders.hpp"
 
@@ -108,6 +109,9 @@ struct Renderer::Impl {
       pass_program(shaders::rounded_vert, shaders::rounded_frag, kShadowPass),
       pass_program(shaders::rounded_vert, shaders::rounded_frag, kGeometryPass),
       pass_program(shaders::rounded_vert, shaders::rounded_frag, kColourPass)};
+  GlProgram mesh[kPasses] = {pass_program(shaders::mesh_vert, shaders::mesh_frag, kShadowPass),
+                             pass_program(shaders::mesh_vert, shaders::mesh_frag, kGeometryPass),
+                             pass_program(shaders::mesh_vert, shaders::mesh_frag, kColourPass)};
   GlProgram ground_geometry =
       pass_program(shaders::screen_vert, shaders::ground_frag, kGeometryPass);
   GlProgram ground_colour = pass_program(shaders::screen_vert, shaders::ground_frag, kColourPass);
@@ -123,6 +127,7 @@ struct Renderer::Impl {
   std::unique_ptr<SharedBuffer> resident_buffer;  ///< of resident_spheres
   BoxInstances boxes, glass;
   RoundedInstances rounded_boxes;
+  MeshModels meshes;
   LineInstances lines;
   std::optional<Targets> targets;
   std::optional<ShadowMap> shadow_map;
@@ -150,7 +155,7 @@ struct Renderer::Impl {
   void upload(const Drawing& drawing, const View& view, const Viewport& viewport) {
     const Real aspect = static_cast<Real>(viewport.width) / static_cast<Real>(viewport.height);
     spheres.upload(order.sort(drawing.spheres(), view, aspect));
-    const View clear = clear_of(std::min(order.nearest(), drawing.nearest_box()), view, aspect);
+    const View clear = clear_of(std::min(order.nearest(), drawing.nearest_surface()), view, aspect);
     const FrameBlock block = make_frame_block(drawing, clear, quality, viewport);
     glBindBuffer(GL_UNIFORM_BUFFER, frame.name());
     glBufferData(GL_UNIFORM_BUFFER, sizeof block, &block, GL_STREAM_DRAW);
@@ -158,6 +163,7 @@ struct Renderer::Impl {
     boxes.upload(drawing.boxes());
     glass.upload(drawing.glass());
     rounded_boxes.upload(drawing.rounded());
+    meshes.upload(drawing.meshes());
     lines.upload(drawing.lines());
     write_resident(drawing.resident(), drawing.eye());
   }
@@ -177,6 +183,8 @@ struct Renderer::Impl {
     boxes.draw();
     rounded[pass].use();
     rounded_boxes.draw();
+    mesh[pass].use();
+    meshes.draw();
     sphere[pass].use();
     const bool smooth = pass == kColourPass && quality.samples > 1;
     if (smooth) glEnable(GL_SAMPLE_ALPHA_TO_COVERAGE);

@@ -1,4 +1,4 @@
-/// OpenGL 3.3 renderer: ray-cast spheres, boxes, grounds, soft shadows.
+/// OpenGL 3.3 renderer: ray-cast spheres, boxes, meshes, grounds, soft shadows.
 #pragma once
 
 #include "src/viewer/camera.hpp"
@@ -32,7 +32,7 @@ struct Viewport {
 };
 
 /// Draws pictures. Requires a current context for its lifetime. A picture takes one draw call per
-/// kind of item and pass, independent of the number of bodies.
+/// kind of item, or per mesh, and pass, independent of the number of bodies.
 class Renderer {
  public:
   explicit Renderer(const Quality& quality = {});

@@ -4,6 +4,7 @@
 #include "src/scene/compound.hpp"
 #include "src/viewer/colours.hpp"
 #include "src/viewer/forces.hpp"
+#include "src/viewer/mesh_geometry.hpp"
 #include "src/viewer/shapes.hpp"
 
 #include <algorithm>
@@ -17,8 +18,13 @@ namespace view {
 namespace {
 
 constexpr Paint kConcrete{168, 168, 166, Pattern::wall};
+/// Darker than kConcrete, because differences of slope are invisible on a bright surface.
+constexpr Paint kStone{114, 118, 120, Pattern::wall};
 constexpr Paint kGlass{255, 255, 255, Pattern::glass};
 constexpr Real kPlate = Real(0.25);  // thickness of a room's floor relative to the body size
+/// Radius around the bodies in which meshes cast shadows, relative to the body size. In a larger
+/// one the shadows of bodies would be coarse.
+constexpr Real kMeshShadows = 40;
 constexpr Real kEndless = kMaxReal / 4;
 
 bool movable(const BodyDef& body) { return body.mass > 0; }
@@ -32,6 +38,15 @@ int thin_axis(const Vec3& h) {
 /// Size of the cells of the ground: the power of ten closest to twice the body size.
 Real cell_for(Real body_size) {
   return std::pow(Real(10), std::round(std::log10(std::max(body_size, Real(1e-6)) * 2)));
+}
+
+/// Distance of a point from the farthest corner of a box.
+Real farthest_distance(const Aabb& box, const Vec3& point) {
+  Vec3 farthest;
+  for (int i = 0; i < 3; ++i) {
+    farthest[i] = std::max(std::fabs(box.lower[i] - point[i]), std::fabs(box.upper[i] - point[i]));
+  }
+  return length(farthest);
 }
 
 }  // namespace
@@ -101,12 +116,33 @@ void ScenePainter::find_room() {
     const BodyDef& body = scene_.bodies[i];
     if (movable(body) || appearances_[i].kind == Appearance::Kind::hidden) continue;
     obstacles_.push_back(i);
-    if (!is_wall(body.shape)) lowest_ = std::min(lowest_, body.position.y - size_of(body.shape));
+    if (is_wall(body.shape) || std::holds_alternative<TriangleMesh>(body.shape)) continue;
+    lowest_ = std::min(lowest_, body.position.y - size_of(body.shape));
+  }
+  find_terrain(bounds);
+}
+
+// A ground below a terrain would be visible beyond its border, at a different height.
+void ScenePainter::find_terrain(const Bounds& bounds) {
+  for (const std::uint32_t i : obstacles_) {
+    const BodyDef& body = scene_.bodies[i];
+    const TriangleMesh* mesh = std::get_if<TriangleMesh>(&body.shape);
+    if (mesh == nullptr || !has_surface(*mesh)) continue;
+    const Aabb box = bounds_of(*mesh, body);
+    lowest_mesh_ = std::min(lowest_mesh_, box.lower.y - body_size_ * kPlate);
+    mesh_reach_ = std::max(mesh_reach_, farthest_distance(box, bounds.centre));
+    bool around = true;
+    for (const int axis : {0, 2}) {
+      around = around && box.lower[axis] <= bounds.centre[axis] - bounds.radius &&
+               box.upper[axis] >= bounds.centre[axis] + bounds.radius;
+    }
+    has_terrain_ = has_terrain_ || around;
   }
 }
 
 Paint ScenePainter::paint(std::uint32_t body) const {
   const BodyDef& def = scene_.bodies[body];
+  if (std::holds_alternative<TriangleMesh>(def.shape)) return kStone;
   if (!movable(def)) return kConcrete;
   if (std::holds_alternative<Box>(def.shape)) return crate_paint(body);
   Paint paint = ball_paint(body);
@@ -123,12 +159,15 @@ ScenePainter::Appearance ScenePainter::appearance_of(std::uint32_t body) const {
   }
   Appearance appearance{Appearance::Kind::still, paint(body)};
   if (!def.kinematic) appearance.paint.pattern = Pattern::plain;
-  if (std::holds_alternative<Box>(def.shape)) appearance.paint.pattern = Pattern::wall;
+  const bool has_lines =
+      std::holds_alternative<Box>(def.shape) || std::holds_alternative<TriangleMesh>(def.shape);
+  if (has_lines) appearance.paint.pattern = Pattern::wall;
   return appearance;
 }
 
 void ScenePainter::draw_still(const Bounds& bounds, Drawing* drawing) const {
-  drawing->set_bounds(bounds.centre, bounds.radius * Real(1.25));
+  const Real shadows = std::min(mesh_reach_, body_size_ * kMeshShadows);
+  drawing->set_bounds(bounds.centre, std::max(bounds.radius * Real(1.25), shadows));
   drawing->set_detail(body_size_ * Real(1.6));
   const Real cell = cell_for(body_size_);
   for (const std::uint32_t i : obstacles_) {
@@ -146,9 +185,9 @@ void ScenePainter::draw_still(const Bounds& bounds, Drawing* drawing) const {
   for (const Wall& wall : walls_) draw_wall(wall, drawing);
   // An additional floor, unless bodies could fall through it.
   const bool has_floor = room_.lower.y > -kEndless;
-  if (!drawing->grounds().empty() || (falls_ && !has_floor)) return;
+  if (!drawing->grounds().empty() || (falls_ && !has_floor) || has_terrain_) return;
   const Real level = has_floor ? lowest_ : bounds.centre.y - bounds.radius - body_size_;
-  drawing->add_ground({0, 1, 0}, level, cell, kGroundPaint);
+  drawing->add_ground({0, 1, 0}, std::min(level, lowest_mesh_), cell, kGroundPaint);
 }
 
 void ScenePainter::draw_wall(const Wall& wall, Drawing* drawing) const {
@@ -212,6 +251,9 @@ void ScenePainter::draw_immovable(const Bounds& bounds, Drawing* drawing) const 
 
 void ScenePainter::draw_shape(const Shape& shape, const BodyState& at, Paint paint,
                               Drawing* drawing) const {
+  if (const TriangleMesh* mesh = std::get_if<TriangleMesh>(&shape)) {
+    drawing->add_mesh(*mesh, at.position, at.orientation, cell_for(body_size_), paint);
+  }
   for_each_solid(shape, at, [&](const auto& solid, const BodyState& state) {
     drawing->add_solid(solid, state.position, state.orientation, paint);
   });

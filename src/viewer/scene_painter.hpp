@@ -70,6 +70,7 @@ class ScenePainter {
   };
 
   void find_room();
+  void find_terrain(const Bounds& bounds);
   std::optional<Wall> wall_of(std::uint32_t body, const Bounds& bounds) const;
   void draw_wall(const Wall& wall, Drawing* drawing) const;
   Appearance appearance_of(std::uint32_t body) const;
@@ -87,7 +88,10 @@ class ScenePainter {
   std::vector<Wall> walls_;               ///< at most one on each side of the room
   Aabb room_;                             ///< inside of the walls; unbounded without a wall
   Real lowest_ = 0;                       ///< of the immovable bodies; the ground lies below
+  Real lowest_mesh_ = kMaxReal;           ///< of the meshes; the ground lies below
+  Real mesh_reach_ = 0;                   ///< farthest distance of a mesh from the bounds' centre
   bool falls_ = false;                    ///< a body has weight
+  bool has_terrain_ = false;              ///< a mesh extends around the movable bodies
 };
 
 }  // namespace view

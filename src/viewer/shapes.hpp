@@ -17,9 +17,17 @@ Real ray_distance(const Shape& shape, const BodyState& state, const Vec3& from,
 
 /// Radius of a ball around the body's position that contains the shape [m]; 0 for planes.
 Real size_of(const Shape& shape);
+/// A point near which the shape is, in body axes: the centre of the bounds of a mesh, and the
+/// origin for other shapes.
+Vec3 middle_of(const Shape& shape);
+/// Radius of a ball around middle_of() that contains the shape [m]; 0 for planes.
+Real reach_of(const Shape& shape);
+/// Bounds in world coordinates of a placed mesh that has a surface.
+Aabb bounds_of(const TriangleMesh& mesh, const BodyDef& body);
 /// The state of a part of a compound body, at rest.
 BodyState placed(const CompoundPart& part, const BodyState& body);
 /// Calls visit(solid, state) for the solids of a body: its shape, or the parts of a compound.
+/// Planes and meshes have no solids.
 template <class Visit>
 void for_each_solid(const Shape& shape, const BodyState& state, const Visit& visit) {
   jfpx::detail::for_each_part(

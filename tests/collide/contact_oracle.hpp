@@ -50,15 +50,17 @@ class ContactOracle {
       return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
     }
     bool is_mesh() const { return std::holds_alternative<TriangleMesh>(shape); }
-    /// Order of the kinds: spheres, boxes, capsules, meshes, walls.
+    /// Order of the kinds: spheres, boxes, capsules, hulls, meshes, walls.
     int kind() const {
       if (is_sphere()) return 0;
       if (std::holds_alternative<Box>(shape)) return 1;
-      return is_mesh() ? 3 : is_wall() ? 4 : 2;
+      if (std::holds_alternative<Capsule>(shape)) return 2;
+      return is_mesh() ? 4 : is_wall() ? 5 : 3;
     }
     SolidShape solid() const {
       if (is_sphere()) return std::get<Sphere>(shape);
       if (const auto* box = std::get_if<Box>(&shape)) return *box;
+      if (const auto* hull = std::get_if<Hull>(&shape)) return *hull;
       return std::get<Capsule>(shape);
     }
     SphereInstance sphere() const { return {pose.origin, std::get<Sphere>(shape).radius}; }

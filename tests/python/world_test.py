@@ -707,3 +707,57 @@ def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
     assert names["pairs"].shape[1] == names["size"] == names["contacts"].pairs.shape[1] > 0
     assert names["report"].step == 120 and len(names["recording"]) == 10
     assert np.isfinite(names["trajectory"]).all()
+
+
+def square_mesh(size=4):
+    """Vertices and triangles of a square in the plane y = 0."""
+    vertices = np.array([[-size, 0, -size], [size, 0, -size], [-size, 0, size], [size, 0, size]])
+    return vertices, np.array([[0, 2, 1], [1, 2, 3]])
+
+
+def test_a_triangle_mesh_carries_a_ball():
+    for dtype in ("float32", "float64"):
+        scene = jfpx.Scene(dtype=dtype)
+        vertices, triangles = square_mesh()
+        report = scene.add_triangle_mesh(vertices, triangles, position=[0, 1, 0], friction=0.9)
+        assert report == {"degenerate": 0, "duplicate": 0, "open_edges": 4, "shared_edges": 0,
+                          "flipped_edges": 0}
+        scene.add_spheres([[0.3, 2, 0.1]], 0.5)
+        shape = scene.to_dict()["bodies"][0]["shape"]
+        assert shape["type"] == "triangle_mesh" and shape["triangles"] == triangles.tolist()
+        with jfpx.World(scene) as world:
+            for _ in range(200):
+                world.step()
+            assert abs(world.states().positions[1, 1] - 1.5) < 1e-3
+
+
+def test_a_triangle_mesh_is_taken_from_an_object():
+    class Mesh:
+        vertices, faces = square_mesh()
+
+    scene = jfpx.Scene()
+    scene.add_triangle_mesh(Mesh(), two_sided=True)
+    assert scene.to_dict()["bodies"][0]["shape"]["two_sided"] is True
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (([[0, 0, 0]],), "triangles is missing"),
+    (([[0, 0, 0]], [[0, 0, 1]]), r"triangles\[0\]\[2\] is 1; it must be an index of the mesh's 1 vertices"),
+    (([[0, 0, 0]], [[0, 0, -1]]), "triangles has the index -1"),
+    (([[0, 0, 0]], [[0.0, 0, 1]]), "triangles has dtype float64; it must be an array of integers"),
+    (([[0, 0]], [[0, 0, 0]]), r"vertices has shape \(1, 2\); it must be \(N, 3\)"),
+    (([[0, 0, np.nan]], [[0, 0, 0]]), r"vertices\[0\]\[2\] is nan"),
+])
+def test_faults_of_a_triangle_mesh_are_named(arguments, message):
+    scene = jfpx.Scene()
+    with pytest.raises(jfpx.InvalidArgument, match=message):
+        scene.add_triangle_mesh(*arguments)
+    assert len(scene) == 0
+
+
+def test_fields_of_the_body_of_a_mesh_are_checked():
+    scene = jfpx.Scene()
+    with pytest.raises(jfpx.InvalidScene, match="mass is 1; it must be 0 for a triangle mesh"):
+        scene.add_triangle_mesh(*square_mesh(), mass=1)
+    with pytest.raises(jfpx.InvalidScene, match="unknown field"):
+        scene.add_triangle_mesh(*square_mesh(), colour=1)

@@ -8,12 +8,25 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <memory>
 #include <string>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
+
+inline view::View view_of(const Vec3& eye, const Vec3& target, Real reach) {
+  view::Camera camera;
+  camera.look_at(eye, target);
+  return camera.view(target, reach);
+}
+
+inline double mean_difference(const view::Image& a, const view::Image& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});
+  return sum / static_cast<double>(a.rgb.size());
+}
 
 /// Base of tests that draw. They are skipped with the reason if OpenGL is not available.
 class GlTest : public ::testing::Test {

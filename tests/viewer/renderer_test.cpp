@@ -13,17 +13,13 @@ namespace jfpx {
 namespace {
 
 using namespace view;
+using test::mean_difference;
+using test::view_of;
 using RendererTest = test::GlTest;
 
 constexpr int kWidth = 320, kHeight = 200;
 constexpr std::array<Paint, 6> kHues = {
     {{220, 20, 20}, {20, 200, 20}, {20, 20, 220}, {210, 200, 10}, {200, 10, 200}, {10, 190, 200}}};
-
-View view_of(const Vec3& eye, const Vec3& target, Real reach) {
-  Camera camera;
-  camera.look_at(eye, target);
-  return camera.view(target, reach);
-}
 
 /// The hue of kHues with the nearest direction in colour space.
 std::size_t nearest_hue(const std::uint8_t* pixel) {
@@ -48,12 +44,6 @@ std::size_t nearest_hue(const std::uint8_t* pixel) {
 std::size_t hue_at(const Image& image, const View& view, const Vec3& point) {
   const auto pixel = project(view, point, image.width, image.height);
   return nearest_hue(image.at(static_cast<int>(pixel->x), static_cast<int>(pixel->y)));
-}
-
-double mean_difference(const Image& a, const Image& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});
-  return sum / static_cast<double>(a.rgb.size());
 }
 
 TEST_F(RendererTest, EveryBodysProjectedCentreHasItsColour) {

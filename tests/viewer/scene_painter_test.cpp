@@ -8,6 +8,7 @@
 #include "src/viewer/forces.hpp"
 #include "src/viewer/run.hpp"
 #include "tests/support/seed.hpp"
+#include "tests/viewer/painted_scene.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,6 +23,9 @@ namespace jfpx {
 namespace {
 
 using namespace view;
+using test::add;
+using test::draw;
+using test::run_state_of;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
@@ -36,28 +40,6 @@ Scene balls(std::size_t count) {
   scene.bodies.back().mass = 0;
   scene.dt = Real(0.125);
   return scene;
-}
-
-void add(Scene* scene, const Shape& shape, const Vec3& position, Real mass) {
-  BodyDef& body = scene->bodies.emplace_back();
-  body.shape = shape;
-  body.position = position;
-  body.mass = mass;
-}
-
-RunState run_state_of(const Scene& scene) {
-  RunState run_state;
-  for (const BodyDef& body : scene.bodies) {
-    run_state.states.push_back({body.position, body.orientation, {}, {}});
-  }
-  run_state.awake.assign(scene.bodies.size(), 1);
-  return run_state;
-}
-
-Drawing draw(const Scene& scene, const RunState& run_state) {
-  Drawing drawing({});
-  ScenePainter(scene).draw(run_state, run_state, 1, Colouring::bodies, &drawing);
-  return drawing;
 }
 
 TEST(Islands, AreConnectedByMovableBodiesOnly) {

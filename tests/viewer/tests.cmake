@@ -1,5 +1,6 @@
 jfpx_add_test(controls_test THESIS SINGLE SOURCES
   viewer/controls_test.cpp
+  viewer/mesh_geometry_test.cpp
   viewer/player_test.cpp
   viewer/scene_painter_test.cpp
   LINK jfpx_viewer)
@@ -11,7 +12,10 @@ jfpx_add_test(panel_test THESIS SINGLE SOURCES
   viewer/dense_screen_test.cpp
   viewer/user.cpp
   LINK jfpx_viewer)
-jfpx_add_test(renderer_test THESIS SINGLE SOURCES viewer/renderer_test.cpp LINK jfpx_viewer)
+jfpx_add_test(renderer_test THESIS SINGLE SOURCES
+  viewer/renderer_test.cpp
+  viewer/mesh_picture_test.cpp
+  LINK jfpx_viewer)
 foreach(suffix IN ITEMS "" "_f64")
   target_compile_definitions(demo_viewer_test${suffix} PRIVATE
     JFPX_INPUT_FOLDER="${PROJECT_SOURCE_DIR}/src/demos/inputs")

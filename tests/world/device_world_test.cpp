@@ -173,8 +173,8 @@ TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
 }
 
 TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
-  for (const char* name :
-       {"pile", "mixed", "polydisperse", "columns", "overlap", "tower", "capsules", "bridge"}) {
+  for (const char* name : {"pile", "mixed", "polydisperse", "columns", "overlap", "tower",
+                           "capsules", "terrain", "bridge"}) {
     scenes::Options options;
     if (name != std::string("tower")) options.spheres = 60;
     const Scene scene = scenes::make(name, options);

@@ -21,8 +21,23 @@ inline Vec3 random_direction(Random* random) {
   return normalized(rotate(random_rotation(random), {1, 0, 0}));
 }
 
+/// The hull of four to twelve points, with its centre of mass at the origin.
+inline Hull random_hull(Random* random) {
+  for (;;) {
+    // A tetrahedron, so that the points are not in a plane, and up to eight points.
+    std::vector<Vec3> points{
+        {0.2_r, 0, -0.1_r}, {-0.2_r, 0, -0.1_r}, {0, 0.2_r, -0.1_r}, {0, 0.1_r, 0.2_r}};
+    for (std::uint64_t left = random->below(9); left > 0; --left) {
+      points.push_back(random->uniform_in_box({-0.5_r, -0.7_r, -0.4_r}, {0.5_r, 0.7_r, 0.4_r}));
+    }
+    const Hull hull(points);
+    if (hull.volume() > 0.02) return centred(hull);
+  }
+}
+
 inline SolidShape random_sub_shape(Random* random) {
-  const std::uint64_t kind = random->below(5);
+  const std::uint64_t kind = random->below(6);
+  if (kind == 5) return random_hull(random);
   if (kind < 2) return Sphere{random->uniform(0.1_r, 0.6_r)};
   if (kind == 2) return Capsule{random->uniform(0.1_r, 0.4_r), random->uniform(0.1_r, 0.6_r)};
   return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.5_r, 0.7_r, 0.9_r})};

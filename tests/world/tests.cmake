@@ -58,6 +58,7 @@ jfpx_add_test(quality_test THESIS SOURCES
   world/free_rotation_test.cpp
   world/friction_test.cpp
   world/heap_test.cpp
+  world/hull_world_test.cpp
   world/impact_test.cpp
   world/oracle_test.cpp
   world/stack_test.cpp)

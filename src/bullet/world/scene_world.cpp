@@ -15,6 +15,7 @@
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleMesh.h>
@@ -62,7 +63,8 @@ class ShapeStore {
  public:
   explicit ShapeStore(bool share) : share_(share) {}
 
-  /// @param axes of the Bullet body relative to the scene's; identity for all but compounds
+  /// @param axes of the Bullet body relative to the scene's; identity for all but compounds and
+  ///   hulls
   btCollisionShape* get(const Shape& shape, const btTransform& axes) {
     return std::visit([&](const auto& s) { return make(s, axes); }, shape);
   }
@@ -98,11 +100,23 @@ class ShapeStore {
   /// Unreachable, because require_bullet() rejects planes.
   btCollisionShape* make(const Plane&, const btTransform&) { return nullptr; }
 
+  /// The points in the axes of the Bullet body. Bullet adds its margin to a hull; a small one keeps
+  /// contacts where the hull is.
+  btCollisionShape* make(const Hull& hull, const btTransform& axes) {
+    auto shape = std::make_unique<btConvexHullShape>();
+    for (const Vec3& vertex : hull.vertices()) {
+      shape->addPoint(axes.inverse() * to_bullet(vertex), false);
+    }
+    shape->setMargin(hull.data().view.least_half_width * btScalar(0.01));
+    shape->recalcLocalAabb();
+    shapes_.push_back(std::move(shape));
+    return shapes_.back().get();
+  }
   btCollisionShape* make(const Compound& compound, const btTransform& axes) {
     auto shape = std::make_unique<btCompoundShape>();
     for (const CompoundPart& part : compound.parts) {
       const btTransform place(to_bullet(normalized(part.orientation)), to_bullet(part.position));
-      const auto child = [&](const auto& solid) { return make(solid, axes); };
+      const auto child = [&](const auto& solid) { return make(solid, btTransform::getIdentity()); };
       shape->addChildShape(axes.inverse() * place, std::visit(child, part.shape));
     }
     shapes_.push_back(std::move(shape));
@@ -111,8 +125,9 @@ class ShapeStore {
 
   template <class S>
   btCollisionShape* make(const S& solid, const btTransform&) {
-    const auto& [h, radius] = detail::to_solid(solid);
-    return get(Key{static_cast<Real>(detail::kSolidKind<S>), h.x, h.y, h.z, radius},
+    const detail::Solid record = detail::to_solid(solid);
+    const Vec3& h = record.half_extents;
+    return get(Key{static_cast<Real>(detail::kSolidKind<S>), h.x, h.y, h.z, record.radius},
                [&] { return bullet_shape(solid); });
   }
 
@@ -146,8 +161,13 @@ void require_bullet(const MaterialSettings& materials) {
   }
 }
 
-/// Bullet has no two-sided plane, and stores moments of inertia about the axes of the shape. Only a
-/// compound can be rotated to its principal axes.
+/// Whether the shape can be rotated to its principal axes in Bullet, which stores moments of
+/// inertia about the axes of the shape.
+bool has_own_axes(const Shape& shape) {
+  return std::holds_alternative<Compound>(shape) || std::holds_alternative<Hull>(shape);
+}
+
+/// Bullet has no two-sided plane, and no products of inertia.
 void require_bullet(const BodyDef& def, std::size_t body) {
   const auto refuse = [body](const char* what) {
     throw InvalidScene("body " + std::to_string(body) + ": " + what);
@@ -157,18 +177,17 @@ void require_bullet(const BodyDef& def, std::size_t body) {
         "shape is a two-sided plane, which Bullet does not support; it must be a half-space or a "
         "box to run in Bullet");
   }
-  if (std::holds_alternative<Compound>(def.shape)) return;
+  if (has_own_axes(def.shape)) return;
   if (def.mass > 0 && def.inertia && !is_diagonal(*def.inertia)) {
     refuse("inertia has products of inertia; it must be diagonal to run in Bullet");
   }
 }
 
-/// The principal inertia of a movable compound; the default for all other bodies.
+/// The principal inertia of a movable compound or hull; the default for all other bodies.
 PrincipalInertia inertia_of(const BodyDef& def) {
-  const auto* compound = std::get_if<Compound>(&def.shape);
-  if (compound == nullptr || !(def.mass > 0)) return {};
+  if (!has_own_axes(def.shape) || !(def.mass > 0)) return {};
   return principal_inertia(def.inertia ? symmetric_part(*def.inertia)
-                                       : mass_properties(*compound, def.mass).inertia);
+                                       : solid_inertia(def.shape, def.mass));
 }
 
 /// The moments of inertia of a solid. Bullet's moments are exact for spheres and boxes; for other
@@ -191,7 +210,7 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInerti
                                        const MaterialSettings& materials, btCollisionShape* shape,
                                        bool can_sleep) {
   const Real mass = is_half_space(def) ? 0 : def.mass;
-  const bool compound = std::holds_alternative<Compound>(def.shape);
+  const bool compound = has_own_axes(def.shape);
   btVector3 inertia(0, 0, 0);
   if (compound) inertia = to_bullet(own.moments);
   if (mass > 0 && !compound) inertia = inertia_of(def, shape);

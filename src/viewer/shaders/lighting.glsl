@@ -46,7 +46,10 @@ float sunlight(vec3 p, vec3 n, float most_taps) {
     }
   }
   if (blockers < 0.5) return 1.0;
-  if (blockers > float(count) - 0.5) return 0.0;
+  // Shadows fade towards the border of the map, where they would otherwise be cut off.
+  vec2 border = min(at.xy, 1.0 - at.xy);
+  float beyond = 1.0 - smoothstep(0.0, 0.1, min(border.x, border.y));
+  if (blockers > float(count) - 0.5) return beyond;
   float gap = (at.z - blocker / blockers) * shadow.z;
   float blur = clamp(gap * sun.w, shadow.x * 1.2, shadow.x * 60.0) / shadow.y;
   float lit = 0.0;
@@ -55,7 +58,7 @@ float sunlight(vec3 p, vec3 n, float most_taps) {
     float depth = texture(shadow_map, at.xy + offset).r;
     lit += depth < min(at.z + dot(slope, offset) - bias, 0.99999) ? 0.0 : 1.0;
   }
-  return lit / float(count);
+  return mix(lit / float(count), 1.0, beyond);
 }
 
 float ambient_light() {
@@ -70,12 +73,13 @@ vec3 fogged(vec3 colour, vec3 p) {
   return mix(haze, colour, exp(-far_away * far_away));
 }
 
-// A surface of the given colour; gloss 1 is a clear coat that reflects the sky.
-vec3 shaded(vec3 albedo, vec3 n, vec3 p, float gloss, float most_taps) {
+// A surface of the given colour; gloss 1 is a clear coat that reflects the sky. The normal of the face
+// differs from the smooth normal `n` on triangles.
+vec3 shaded_face(vec3 albedo, vec3 n, vec3 face, vec3 p, float gloss, float most_taps) {
   vec3 to_eye = -normalize(p);
   float open = ambient_light();
   float facing = dot(n, sun.xyz);
-  float lit = facing > 0.0 ? sunlight(p, n, most_taps) : 0.0;
+  float lit = min(facing, dot(face, sun.xyz)) > 0.0 ? sunlight(p, face, most_taps) : 0.0;
   vec3 ambient = mix(kBounce, kSkyLight, 0.5 + 0.5 * n.y) * open;
   vec3 colour = albedo * (ambient + kSun * max(facing, 0.0) * lit);
   float grazing = 1.0 - max(dot(n, to_eye), 0.0);
@@ -86,4 +90,8 @@ vec3 shaded(vec3 albedo, vec3 n, vec3 p, float gloss, float most_taps) {
   float glint = max(dot(n, normalize(sun.xyz + to_eye)), 0.0);
   colour += kSun * gloss * lit * (1.6 * pow(glint, 420.0) + 0.10 * pow(glint, 40.0));
   return fogged(colour, p);
+}
+
+vec3 shaded(vec3 albedo, vec3 n, vec3 p, float gloss, float most_taps) {
+  return shaded_face(albedo, n, n, p, gloss, most_taps);
 }

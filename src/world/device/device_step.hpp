@@ -72,7 +72,8 @@ class DeviceStep final : public DeviceWorld {
     }
     bodies_.upload(transfer_, bodies, room_, &data_);
     scratch_.reserve_bodies(transfer_, room_, &data_);
-    current_sub_shapes().upload(transfer_, sub_shapes->view(), sub_shapes->part_count());
+    hulls_.clear();
+    current_sub_shapes().upload(transfer_, sub_shapes->view(), sub_shapes->part_count(), &hulls_);
     use_sub_shapes();
     trees_.clear();
     update_trees(bodies);
@@ -318,7 +319,7 @@ class DeviceStep final : public DeviceWorld {
     std::ranges::sort(*added, {}, &BodyId::index);
     SubShapeTable table;
     table.set_bodies(bodies, *added);
-    added_shapes_.upload(edit_transfer_, table.view(), table.part_count());
+    added_shapes_.upload(edit_transfer_, table.view(), table.part_count(), &hulls_);
     SubShapes &before = current_sub_shapes(), &after = sub_shapes_[1 - sub_shapes_now_];
     SubShapeRanges* kept = edit_transfer_.room(&kept_shapes_, 1);
     device_->run(MergeProgram{.data = data_,
@@ -360,7 +361,7 @@ class DeviceStep final : public DeviceWorld {
     bodies.torque = bodies_.torque();
     force_sum_ = torque_sum_ = nullptr;
     if (table == nullptr) return;
-    if (forces_.upload(transfer_, *table)) ++changes_;
+    if (forces_.upload(transfer_, *table, &hulls_)) ++changes_;
     force_sum_ = forces_.force_sums(transfer_, bodies.capacity);
     torque_sum_ = forces_.torque_sums(transfer_, bodies.capacity);
     bodies.force = force_sum_;
@@ -522,6 +523,7 @@ class DeviceStep final : public DeviceWorld {
   SubShapes sub_shapes_[2], added_shapes_;
   int sub_shapes_now_ = 0;  ///< index of the current sub-shapes
   FixedTreeBuffers<Device> trees_;
+  HullBuffers<Device> hulls_;
   JointBuffers<Device> joints_;
   ForceBuffers<Device> forces_;
   Contacts contacts_[2];  ///< indexed as Progress::contacts

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/world/device/force_program.hpp"
+#include "src/world/device/hull_buffers.hpp"
 #include "src/world/device/transfer.hpp"
 #include "src/world/forces/force_table.hpp"
 
@@ -9,6 +10,7 @@
 #include <tuple>
 #include <utility>
 #include <variant>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -18,11 +20,12 @@ template <class Device>
 class ForceBuffers {
  public:
   /// Copies the changes since the last call. @returns whether the lists have changed
-  bool upload(const Transfer<Device>& transfer, const ForceTable& table) {
+  bool upload(const Transfer<Device>& transfer, const ForceTable& table,
+              HullBuffers<Device>* hulls) {
     const ForceView from = table.view();
     const bool has_new_lists = lists_version_ != table.lists_version();
     if (parameters_version_ != table.parameters_version()) put_parameters(transfer, from);
-    if (has_new_lists) put_lists(transfer, from);
+    if (has_new_lists) put_lists(transfer, from, hulls);
     parameters_version_ = table.parameters_version();
     lists_version_ = table.lists_version();
     return has_new_lists;
@@ -59,13 +62,16 @@ class ForceBuffers {
                                             from.template array<F>().count}),
      ...);
   }
-  void put_lists(const Transfer<Device>& transfer, const ForceView& from) {
+  void put_lists(const Transfer<Device>& transfer, const ForceView& from,
+                 HullBuffers<Device>* hulls) {
     view_.on_all_count = from.on_all_count;
     view_.on_all = transfer.put(&on_all_, from.on_all, from.on_all_count);
     view_.on_body = transfer.put(&on_body_, from.on_body, from.on_body_count);
     view_.first_item = transfer.put(&first_item_, from.first_item, from.first_item_count);
     view_.mass = transfer.put(&mass_, from.mass, from.mass_count);
-    view_.parts = transfer.put(&parts_, from.parts, from.part_count);
+    parts_on_device_.assign(from.parts, from.parts + from.part_count);
+    for (SolidPart& part : parts_on_device_) hulls->move_to_device(transfer, &part.solid);
+    view_.parts = transfer.put(&parts_, parts_on_device_);
     view_.first_part = transfer.put(&first_part_, from.first_part, from.first_part_count);
   }
 
@@ -74,6 +80,7 @@ class ForceBuffers {
   Buffer<std::uint32_t> first_item_, first_part_;
   Buffer<Real> mass_;
   Buffer<SolidPart> parts_;
+  std::vector<SolidPart> parts_on_device_;  ///< of upload(), until it is complete
   Buffer<Vec3> force_sum_, torque_sum_;
   ForceView view_;
   std::uint64_t parameters_version_ = 0, lists_version_ = 0;  ///< of the table; 0: none

@@ -1,6 +1,7 @@
 /// The sub-shapes of the bodies in the memory of a device.
 #pragma once
 
+#include "src/world/device/hull_buffers.hpp"
 #include "src/world/device/merge_program.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -18,7 +20,8 @@ class SubShapeBuffers {
  public:
   /// Copies sub-shapes to the device, with memory for parts of compounds that are added later.
   /// @param part_count number of parts of compounds
-  void upload(const Transfer<Device>& transfer, const SubShapeView& from, std::size_t part_count) {
+  void upload(const Transfer<Device>& transfer, const SubShapeView& from, std::size_t part_count,
+              HullBuffers<Device>* hulls) {
     const std::uint32_t bounded = from.ranges.bounded();
     ranges_ = from.ranges;
     part_count_ = static_cast<std::uint32_t>(part_count);
@@ -26,7 +29,9 @@ class SubShapeBuffers {
     transfer.put(&bodies_, from.bodies, ranges_.all());
     transfer.put(&numbers_, from.numbers, ranges_.all());
     transfer.put(&bounds_, from.all_bounds, bounded);
-    transfer.put(&solids_, from.solids, bounded - ranges_.spheres());
+    solids_on_device_.assign(from.solids, from.solids + (bounded - ranges_.spheres()));
+    for (PosedSolid& solid : solids_on_device_) hulls->move_to_device(transfer, &solid.solid);
+    transfer.put(&solids_, solids_on_device_);
     transfer.put(&walls_, from.walls, ranges_.all() - bounded);
     transfer.put(&parts_, from.parts, bounded);
     transfer.put(&local_, from.local, part_count, part_room_);
@@ -74,6 +79,7 @@ class SubShapeBuffers {
   Buffer<PosedSolid> solids_;
   Buffer<Wall> walls_;
   Buffer<Transform> local_;
+  std::vector<PosedSolid> solids_on_device_;  ///< of upload(), until it is complete
   SubShapeRanges ranges_;
   std::uint32_t part_count_ = 0;  ///< size of local_, including parts of removed compounds
   std::size_t part_room_ = 0;

@@ -42,6 +42,15 @@ requires HasFields<T>
 void serialize(auto& archive, T& value) {
   each_field(value, [&](const auto&, auto& member) { archive(member); });
 }
+template <class T>
+requires HasFields<T>
+void serialize(BinaryReader& reader, T& value) {
+  try {
+    each_field(value, [&](const auto&, auto& member) { reader(member); });
+  } catch (const InvalidArgument& error) {  // by the constructor of a shape
+    BinaryReader::fail(error.what());
+  }
+}
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -1,0 +1,265 @@
+/// Collision of two polyhedra: the separating-axis test over the normals of faces and the cross
+/// products of edges whose arcs cross on the Gauss map (Gregorius, The separating axis test between
+/// convex polyhedra, 2013), and the contact points from two faces or two edges.
+#pragma once
+
+#include "src/collide/face_points.hpp"
+#include "src/collide/polyhedron.hpp"
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+/// Two polyhedra in the axes of the first. The columns of `rotation` are the axes of b.
+template <class A, class B>
+struct PolyhedronPair {
+  A a;
+  B b;
+  Mat3 rotation;
+  Vec3 offset;  ///< [m], of b
+  Real size;    ///< [m], the scale of the rounding errors
+
+  JFPX_HD Vec3 vertex_of_b(int i) const { return rotation * b.vertex(i) + offset; }
+};
+
+/// The axis of a contact: a face of a, a face of b, or an edge of each.
+struct PolyhedronAxis {
+  enum Kind : std::uint8_t { none, face_of_a, face_of_b, edges };
+  Kind kind = none;
+  int first = 0, second = 0;  ///< face, or edges of a and b
+  LeastOverlap overlap;       ///< the normal is from b to a, in the axes of a
+};
+
+/// As preferred() for overlaps.
+JFPX_HD inline const PolyhedronAxis& preferred(const PolyhedronAxis& first,
+                                               const PolyhedronAxis& later) {
+  if (later.kind == PolyhedronAxis::none) return first;
+  return &preferred(first.overlap, later.overlap) == &first.overlap ? first : later;
+}
+
+/// Whether the polyhedra are farther apart than `limit` along the line of their centres, which
+/// separates most polyhedra that are not close.
+template <class A, class B>
+JFPX_HD bool are_far_apart(const PolyhedronPair<A, B>& pair, Real limit) {
+  const Vec3 centre_b = pair.rotation * pair.b.centre() + pair.offset;
+  const Vec3 line = centre_b - pair.a.centre();
+  const Real distance = length(line);
+  if (!(distance > 0)) return false;
+  const Vec3 n = line * (Real(1) / distance);
+  const Real reach_b = pair.b.support(-transform_transpose(pair.rotation, n));
+  return dot(n, pair.offset) - reach_b - pair.a.support(n) > limit;
+}
+
+/// Whether a face can't have a larger separation than the best one, because the other polyhedron
+/// reaches back at least to its inner ball.
+/// @param height [m], of the centre of the other polyhedron above the face
+JFPX_HD inline bool is_beaten(const PolyhedronAxis& best, Real height, Real inner_radius,
+                              Real error) {
+  return best.kind != PolyhedronAxis::none &&
+         height - inner_radius + error <= best.overlap.distance;
+}
+
+/// The face of a with the largest separation. @returns false if it is above `limit`
+template <class A, class B>
+JFPX_HD bool test_faces_of_a(const PolyhedronPair<A, B>& pair, Real error, Real limit,
+                             PolyhedronAxis* best) {
+  const Vec3 centre_b = pair.rotation * pair.b.centre() + pair.offset;
+  const Real inner_radius = pair.b.inner_radius();
+  for (int i = 0; i < pair.a.face_count(); ++i) {
+    const Vec3 n = pair.a.face_normal(i);
+    const Real height = dot(n, centre_b) - pair.a.face_offset(i);
+    if (is_beaten(*best, height, inner_radius, error)) continue;
+    const Real reach = pair.b.support(-transform_transpose(pair.rotation, n));
+    const Real distance = dot(n, pair.offset) - reach - pair.a.face_offset(i);
+    if (distance > limit) return false;
+    if (best->kind == PolyhedronAxis::none || distance > best->overlap.distance) {
+      *best = {PolyhedronAxis::face_of_a, i, 0, {0, distance, error, -n}};
+    }
+  }
+  return true;
+}
+template <class A, class B>
+JFPX_HD bool test_faces_of_b(const PolyhedronPair<A, B>& pair, Real error, Real limit,
+                             PolyhedronAxis* best) {
+  const Vec3 centre_a = pair.a.centre() - pair.offset;
+  const Real inner_radius = pair.a.inner_radius();
+  for (int i = 0; i < pair.b.face_count(); ++i) {
+    const Vec3 n = pair.rotation * pair.b.face_normal(i);
+    const Real height = dot(n, centre_a) - pair.b.face_offset(i);
+    if (is_beaten(*best, height, inner_radius, error)) continue;
+    const Real distance = -dot(n, pair.offset) - pair.a.support(-n) - pair.b.face_offset(i);
+    if (distance > limit) return false;
+    if (best->kind == PolyhedronAxis::none || distance > best->overlap.distance) {
+      *best = {PolyhedronAxis::face_of_b, i, 0, {0, distance, error, n}};
+    }
+  }
+  return true;
+}
+
+/// Whether an edge cannot belong to an axis with a separation above `least`: along every outward
+/// normal n of the edge, the other polyhedron reaches back at least to its inner ball. The normals
+/// are on the arc between those of the two faces, whose largest product with a vector exceeds those
+/// of its ends by at most 1 / cos(half the angle).
+/// @param u,v     outward normals of the faces
+/// @param to_edge from the centre of the other polyhedron's inner ball to the edge
+JFPX_HD inline bool faces_away(const Vec3& u, const Vec3& v, const Vec3& to_edge, Real inner_radius,
+                               Real least, Real error) {
+  const Real reach = least + inner_radius - 4 * error;
+  if (!(reach > 0)) return false;
+  const Real p = -dot(u, to_edge), q = -dot(v, to_edge), most = p > q ? p : q;
+  const Real cosine2 = (1 + dot(u, v)) * Real(0.5);  // of half the angle
+  return most < 0 || most * most < reach * reach * cosine2 * (1 - 16 * kEpsilon);
+}
+
+/// The pair of edges with the largest separation above `least`. Only pairs whose arcs cross on the
+/// Gauss map are edges of the Minkowski difference.
+/// @returns false if the separation is above `limit`
+template <class A, class B>
+JFPX_HD bool test_edges(const PolyhedronPair<A, B>& pair, Real error, Real least, Real limit,
+                        PolyhedronAxis* best) {
+  std::uint16_t edges_of_a[Hull::kMaxEdges];
+  int count = 0;
+  const Vec3 centre_b = pair.rotation * pair.b.centre() + pair.offset;
+  for (int i = 0; i < pair.a.edge_count(); ++i) {
+    const PolyhedronEdge edge = pair.a.edge(i);
+    if (!faces_away(pair.a.face_normal(edge.face), pair.a.face_normal(edge.other_face),
+                    pair.a.vertex(edge.a) - centre_b, pair.b.inner_radius(), least, error)) {
+      edges_of_a[count++] = static_cast<std::uint16_t>(i);
+    }
+  }
+  for (int k = 0; k < pair.b.edge_count(); ++k) {
+    const PolyhedronEdge eb = pair.b.edge(k);
+    const Vec3 pb = pair.vertex_of_b(eb.a);
+    const Vec3 c = -(pair.rotation * pair.b.face_normal(eb.face));
+    const Vec3 d = -(pair.rotation * pair.b.face_normal(eb.other_face));
+    if (faces_away(-c, -d, pb - pair.a.centre(), pair.a.inner_radius(), least, error)) continue;
+    const Vec3 along_b = pair.vertex_of_b(eb.b) - pb, dc = cross(d, c);
+    const Real size_b = length_squared(along_b);
+    for (int m = 0; m < count; ++m) {
+      const int i = edges_of_a[m];
+      const PolyhedronEdge ea = pair.a.edge(i);
+      const Vec3 u = pair.a.face_normal(ea.face), v = pair.a.face_normal(ea.other_face);
+      const Real udc = dot(u, dc), vdc = dot(v, dc);
+      if (!(udc * vdc < 0)) continue;
+      const Vec3 vu = cross(v, u);
+      const Real cvu = dot(c, vu), dvu = dot(d, vu);
+      if (!(cvu * dvu < 0 && cvu * vdc > 0)) continue;
+      const Vec3 pa = pair.a.vertex(ea.a), along_a = pair.a.vertex(ea.b) - pa;
+      Vec3 n = cross(along_a, along_b);
+      const Real across2 = length_squared(n), sizes = length_squared(along_a) * size_b;
+      if (!(across2 > 4 * kEpsilon * sizes)) continue;
+      n = n * (Real(1) / square_root(across2));
+      if (dot(n, u + v) < 0) n = -n;
+      const Real distance = dot(n, pb - pa);
+      if (distance > limit) return false;
+      if (best->kind == PolyhedronAxis::none || distance > best->overlap.distance) {
+        const Real sine = square_root(across2 / sizes);
+        *best = {PolyhedronAxis::edges, i, k, {0, distance, error / sine, -n}};
+      }
+    }
+  }
+  return true;
+}
+
+/// The axes of a contact.
+struct PolyhedronAxes {
+  PolyhedronAxis preferred;  ///< faces precede edges; steady for resting polyhedra
+  PolyhedronAxis widest;     ///< of the largest separation, or of least overlap
+};
+
+/// False if an axis separates the polyhedra by more than `limit`.
+template <class A, class B>
+JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit, PolyhedronAxes* axes) {
+  const Real error = 8 * kEpsilon * pair.size;
+  PolyhedronAxis of_a, of_b, edges;
+  if (are_far_apart(pair, limit)) return false;
+  if (!test_faces_of_a(pair, error, limit, &of_a)) return false;
+  if (!test_faces_of_b(pair, error, limit, &of_b)) return false;
+  axes->widest = of_b.overlap.distance > of_a.overlap.distance ? of_b : of_a;
+  if (!test_edges(pair, error, axes->widest.overlap.distance, limit, &edges)) return false;
+  axes->preferred = preferred(preferred(of_a, of_b), edges);
+  if (edges.kind != PolyhedronAxis::none &&
+      edges.overlap.distance > axes->widest.overlap.distance) {
+    axes->widest = edges;
+  }
+  return true;
+}
+
+/// The midpoint between the closest points of two edges that are not parallel (Goldman 1990).
+JFPX_HD inline Vec3 middle_of_edges(const Vec3& a, const Vec3& along_a, const Vec3& b,
+                                    const Vec3& along_b) {
+  const auto clamp = [](Real x) { return x > 1 ? Real(1) : x < 0 ? Real(0) : x; };
+  const Vec3 common = cross(along_a, along_b);
+  const Real scale = Real(1) / length_squared(common);
+  const Real s = clamp(dot(cross(b - a, along_b), common) * scale);
+  const Real t = clamp(dot(cross(b - a, along_a), common) * scale);
+  return (add_scaled(a, along_a, s) + add_scaled(b, along_b, t)) * Real(0.5);
+}
+
+/// Calls add(point, distance, feature) for the points of the contact, in the axes of a; the point
+/// is in the middle of the overlap.
+/// @param margin largest distance of a point
+template <class A, class B, class Add>
+JFPX_HD void visit_contact_points(const PolyhedronPair<A, B>& pair, const PolyhedronAxis& axis,
+                                  Real margin, const Add& add) {
+  if (axis.kind == PolyhedronAxis::edges) {
+    const PolyhedronEdge ea = pair.a.edge(axis.first), eb = pair.b.edge(axis.second);
+    const Vec3 pa = pair.a.vertex(ea.a), pb = pair.vertex_of_b(eb.a);
+    const auto first = static_cast<std::uint32_t>(axis.first);
+    const auto second = static_cast<std::uint32_t>(axis.second);
+    constexpr std::uint32_t kEdges = 0x80000000u, kMostEdges = 512;
+    add(middle_of_edges(pa, pair.a.vertex(ea.b) - pa, pb, pair.vertex_of_b(eb.b) - pb),
+        axis.overlap.distance, kEdges + first * kMostEdges + second);
+    return;
+  }
+  // The normal of the reference face points to the other polyhedron.
+  const bool is_of_a = axis.kind == PolyhedronAxis::face_of_a;
+  const Vec3 n = is_of_a ? -axis.overlap.normal : axis.overlap.normal;
+  const int face_a = is_of_a ? axis.first : facing_face(pair.a, n);
+  const int face_b =
+      is_of_a ? facing_face(pair.b, transform_transpose(pair.rotation, n)) : axis.first;
+  const auto of_a = make_face(
+      pair.a.corner_count(face_a), [&](int k) { return pair.a.corner(face_a, k); },
+      pair.a.face_normal(face_a));
+  const auto of_b = make_face(
+      pair.b.corner_count(face_b),
+      [&](int k) { return pair.rotation * pair.b.corner(face_b, k) + pair.offset; },
+      pair.rotation * pair.b.face_normal(face_b));
+  // Unique for the faces up to a collision of the products, which only moves impulses.
+  const std::uint32_t faces =
+      (static_cast<std::uint32_t>(face_a) * 256 + static_cast<std::uint32_t>(face_b)) *
+          PointFeature::kCount * 2 +
+      (is_of_a ? 0 : PointFeature::kCount);
+  const auto keep = [&](const Vec3& p, Real distance, std::uint32_t feature) {
+    if (!(distance <= margin)) return;
+    add(add_scaled(p, n, distance * Real(-0.5)), distance, (faces + feature) & 0x7fffffffu);
+  };
+  const auto all = [](int) { return true; };
+  if (is_of_a) {
+    visit_face_points(of_a, of_b, all, 0, keep);
+  } else {
+    visit_face_points(of_b, of_a, all, 0, keep);
+  }
+}
+
+/// The vertex that is deepest below a reference face.
+template <class A, class B, class Add>
+JFPX_HD void visit_deepest_vertex(const PolyhedronPair<A, B>& pair, const PolyhedronAxis& axis,
+                                  const Add& add) {
+  const bool is_of_a = axis.kind == PolyhedronAxis::face_of_a;
+  const Vec3 n = is_of_a ? -axis.overlap.normal : axis.overlap.normal;
+  const int count = is_of_a ? pair.b.vertex_count() : pair.a.vertex_count();
+  Vec3 lowest;
+  Real least = kMaxReal;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = is_of_a ? pair.vertex_of_b(i) : pair.a.vertex(i);
+    const Real height = dot(n, p);
+    if (height < least) least = height, lowest = p;
+  }
+  add(add_scaled(lowest, n, axis.overlap.distance * Real(-0.5)), axis.overlap.distance,
+      PointFeature::kCount - 1);
+}
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx

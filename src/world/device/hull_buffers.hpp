@@ -1,0 +1,78 @@
+/// The hulls of a world in the memory of a device.
+#pragma once
+
+#include "src/collide/shapes.hpp"
+#include "src/world/device/transfer.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace device {
+
+/// Copies hulls to the device when a list of solids with pointers to them is copied.
+template <class Device>
+class HullBuffers {
+ public:
+  /// Removes all hulls. Every list of solids must be copied again.
+  void clear() { copies_.clear(); }
+
+  /// Replaces the pointer to a hull in host memory by one to its copy on the device. Waits if the
+  /// hull is new.
+  void move_to_device(const Transfer<Device>& transfer, detail::Solid* solid) {
+    if (solid->hull == nullptr) return;
+    const detail::HullView& hull = *solid->hull;
+    Copy& copy = copies_[hull.serial];
+    if (copy.words.empty()) put(transfer, hull, &copy);
+    solid->hull = reinterpret_cast<const detail::HullView*>(copy.buffer.data());
+  }
+
+ private:
+  struct Copy {
+    typename Device::template Buffer<std::uint64_t> buffer;
+    std::vector<std::uint64_t> words;
+  };
+
+  /// All arrays of a hull are in one buffer, behind its view.
+  static void put(const Transfer<Device>& transfer, const detail::HullView& hull, Copy* copy) {
+    std::size_t size = words_of<detail::HullView>(1);
+    const auto reserve = [&size]<class T>(const T*, std::size_t count) {
+      const std::size_t place = size;
+      size += words_of<T>(count);
+      return place;
+    };
+    const std::size_t vertices = reserve(hull.vertices, hull.vertex_count);
+    const std::size_t faces = reserve(hull.faces, hull.face_count);
+    const std::size_t corners = reserve(hull.corners, hull.corner_count);
+    const std::size_t edges = reserve(hull.edges, hull.edge_count);
+    std::vector<std::uint64_t>& words = copy->words;
+    words.assign(size, 0);
+    const std::uint64_t* const base = transfer.room(&copy->buffer, size);
+    detail::HullView view = hull;
+    const auto fill = [&]<class T>(std::size_t place, const T* from, std::size_t count) {
+      std::memcpy(&words[place], from, count * sizeof(T));
+      return reinterpret_cast<const T*>(base + place);
+    };
+    view.vertices = fill(vertices, hull.vertices, hull.vertex_count);
+    view.faces = fill(faces, hull.faces, hull.face_count);
+    view.corners = fill(corners, hull.corners, hull.corner_count);
+    view.edges = fill(edges, hull.edges, hull.edge_count);
+    std::memcpy(words.data(), &view, sizeof view);
+    transfer.put(&copy->buffer, words.data(), size);
+    transfer.wait();
+  }
+  template <class T>
+  static std::size_t words_of(std::size_t count) {
+    return (count * sizeof(T) + sizeof(std::uint64_t) - 1) / sizeof(std::uint64_t);
+  }
+
+  std::map<std::uint64_t, Copy> copies_;  ///< by HullView::serial
+};
+
+}  // namespace device
+}  // namespace JFPX_ABI
+}  // namespace jfpx

@@ -1,0 +1,205 @@
+/// Tests of the contacts of hulls against a convex distance in double, and of hulls with the
+/// vertices of a box against boxes.
+#include <jfpx/collide.hpp>
+
+#include "src/world/bodies/sub_shape_view.hpp"
+#include "tests/collide/rounded_points.hpp"
+#include "tests/world/random_bodies.hpp"
+
+#include <gtest/gtest.h>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+using test::core_gap;
+using test::RoundedPoints;
+
+SolidShape solid_of(std::uint64_t kind, Random* random) {
+  if (kind == 0) return Sphere{random->uniform(0.1_r, 0.8_r)};
+  if (kind == 1) return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.7_r, 0.7_r, 0.7_r})};
+  if (kind == 2) return Capsule{random->uniform(0.05_r, 0.5_r), random->uniform(0.05_r, 0.9_r)};
+  return test::random_hull(random);
+}
+
+detail::PairManifold contact_of(const SolidShape& a, const Transform& pose_a, const SolidShape& b,
+                                const Transform& pose_b, const detail::PairMotion& pair = {}) {
+  detail::PairManifold found;
+  const auto test = [&](const auto& x, const auto& y) {
+    detail::find_contact_of_any(detail::instance(x, pose_a), detail::instance(y, pose_b), pair,
+                                &found);
+  };
+  std::visit(test, a, b);
+  return found;
+}
+
+Real deepest(const detail::PairManifold& manifold) {
+  Real distance = 0;
+  for (std::uint32_t k = 0; k < manifold.touch_count; ++k) {
+    distance = std::min(distance, manifold.touches[k].distance);
+  }
+  return distance;
+}
+
+TEST(HullContact, HasTheDepthOfTheOracleWithEverySolid) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int touching[4] = {}, deep[4] = {}, missed = 0;
+  for (int n = 0; n < 6000; ++n) {
+    const auto kind = static_cast<std::uint64_t>(n % 4);
+    const SolidShape hull = test::random_hull(&random), other = solid_of(kind, &random);
+    const bool hull_first = random.below(2) == 0;
+    const Transform at = make_transform(test::random_rotation(&random), {});
+    const Transform pose = make_transform(test::random_rotation(&random),
+                                          random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    RoundedPoints a(hull, at);
+    const RoundedPoints b(other, pose);
+    const double radius = a.radius + b.radius, core = core_gap(a, b), gap = core - radius;
+    const detail::PairManifold found =
+        hull_first ? contact_of(hull, at, other, pose) : contact_of(other, pose, hull, at);
+    const double tolerance = 2e-5;
+    if (gap > tolerance) {
+      ASSERT_EQ(found.touch_count, 0u) << n << ", gap " << gap;
+      continue;
+    }
+    if (core > 0 && gap > -tolerance) continue;
+    if (core == 0 && found.touch_count == 0) {  // the depth may be less than rounding
+      ++missed;
+      continue;
+    }
+    ASSERT_GT(found.touch_count, 0u) << n << ", gap " << gap;
+    ++touching[kind];
+    const Real distance = deepest(found);
+    ASSERT_NEAR(static_cast<double>(length(found.normal)), 1, 1e-5);
+    if (core > 1e-4) {
+      ASSERT_NEAR(static_cast<double>(distance), gap, 0.011 * radius + 1e-4) << n;
+    }
+    a.move(found.normal * (hull_first ? -distance : distance));
+    // Without overlap after the motion; an edge may have up to 2 % less depth than the face that is
+    // preferred, and a capsule up to a hundredth of its radius.
+    const double left = core_gap(a, b) - radius;
+    ASSERT_GT(left, -0.021 * static_cast<double>(-distance) - 0.011 * radius - 1e-4)
+        << n << ", kind " << kind;
+    deep[kind] += core < 1e-9 ? 1 : 0;
+  }
+  EXPECT_LE(missed, 2);
+  for (int kind = 0; kind < 4; ++kind) {
+    EXPECT_GT(touching[kind], 100) << kind;
+    if (kind != 0) {
+      EXPECT_GT(deep[kind], 30) << kind;
+    }
+  }
+}
+
+/// Each point is in the middle of the overlap: within half the depth of both solids.
+TEST(HullContact, PointsAreInTheOverlap) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  std::uint64_t points = 0;
+  for (int n = 0; n < 3000; ++n) {
+    const SolidShape a = test::random_hull(&random);
+    const SolidShape b = random.below(2) == 0 ? solid_of(1, &random) : solid_of(3, &random);
+    const Transform at = make_transform(test::random_rotation(&random), {});
+    const Transform pose = make_transform(test::random_rotation(&random),
+                                          random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    const detail::PairManifold found = contact_of(a, at, b, pose);
+    const RoundedPoints of_a(a, at), of_b(b, pose);
+    for (std::uint32_t k = 0; k < found.touch_count; ++k) {
+      RoundedPoints point(Sphere{1}, {{}, found.touches[k].point});
+      const double depth = -static_cast<double>(found.touches[k].distance);
+      EXPECT_LT(core_gap(point, of_a), 0.52 * depth + 1e-4) << n;
+      EXPECT_LT(core_gap(point, of_b), 0.52 * depth + 1e-4) << n;
+      ++points;
+    }
+  }
+  EXPECT_GT(points, 100u);
+}
+
+/// A hull with the vertices of a box has the contacts of the box, to rounding.
+TEST(HullContact, AHullOfABoxHasTheContactsOfTheBox) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int touching = 0;
+  for (int n = 0; n < 3000; ++n) {
+    const Box box{random.uniform_in_box({0.2_r, 0.2_r, 0.2_r}, {0.8_r, 0.8_r, 0.8_r})};
+    std::vector<Vec3> corners;
+    for (int i = 0; i < 8; ++i) {
+      corners.push_back({(i & 1) != 0 ? box.half_extents.x : -box.half_extents.x,
+                         (i & 2) != 0 ? box.half_extents.y : -box.half_extents.y,
+                         (i & 4) != 0 ? box.half_extents.z : -box.half_extents.z});
+    }
+    const Hull hull(corners);
+    ASSERT_EQ(hull.faces().size(), 6u);
+    const SolidShape other = solid_of(random.below(3), &random);
+    const Transform at = make_transform(test::random_rotation(&random), {});
+    const Transform pose = make_transform(test::random_rotation(&random),
+                                          random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    const detail::PairManifold found = contact_of(hull, at, other, pose),
+                               expected = contact_of(box, at, other, pose);
+    const Real depth = deepest(expected);
+    if (depth > -1e-4_r && depth < 0) continue;
+    ASSERT_EQ(found.touch_count > 0, expected.touch_count > 0) << n;
+    if (expected.touch_count == 0) continue;
+    ++touching;
+    // Preferred axes may differ by 2 % of the depth.
+    ASSERT_NEAR(deepest(found), depth, 0.021_r * -depth + 1e-4_r) << n;
+  }
+  EXPECT_GT(touching, 300);
+}
+
+TEST(HullContact, OnAHalfSpaceTheLowestVerticesTouch) {
+  Random random(7);
+  for (int n = 0; n < 300; ++n) {
+    const Hull hull = test::random_hull(&random);
+    const Transform pose = make_transform(test::random_rotation(&random), {0, 0.2_r, 0});
+    detail::PairManifold found;
+    find_contact(detail::instance(hull, pose), HalfSpace{}, {}, &found);
+    Real lowest = 1;
+    std::uint32_t below = 0;
+    for (const Vec3& v : hull.vertices()) {
+      const Real height = transform_point(pose, v).y;
+      lowest = std::min(lowest, height);
+      below += height <= 0 ? 1 : 0;
+    }
+    ASSERT_EQ(found.touch_count > 0, below > 0) << n;
+    ASSERT_LE(found.touch_count, std::min(below, 8u)) << n;
+    if (below > 0) {
+      ASSERT_EQ(deepest(found), lowest) << n;
+    }
+  }
+}
+
+TEST(HullContact, RaysEnterAtTheFirstFace) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int hits = 0;
+  for (int n = 0; n < 4000; ++n) {
+    const Hull hull = test::random_hull(&random);
+    const Transform pose = make_transform(test::random_rotation(&random),
+                                          random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    const Vec3 from = random.uniform_in_box({-3, -3, -3}, {3, 3, 3});
+    const Vec3 to = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+    const Vec3 direction = normalized(to - from);
+    const detail::RayEntry entry = detail::enter(from, direction, hull, pose);
+    const RoundedPoints solid(hull, pose);
+    const auto gap_at = [&](Real t) {
+      return core_gap(RoundedPoints(Sphere{1}, {{}, add_scaled(from, direction, t)}), solid);
+    };
+    if (!entry.hit) {
+      for (Real t = 0; t < 8; t += 0.05_r) ASSERT_GT(gap_at(t), 0) << n;
+      continue;
+    }
+    ++hits;
+    ASSERT_LT(gap_at(entry.distance), 1e-5) << n;
+    for (Real t = 0; t < entry.distance - 1e-3_r; t += 0.05_r) ASSERT_GT(gap_at(t), 0) << n;
+    ASSERT_LT(dot(entry.normal, direction), 0) << n;
+  }
+  EXPECT_GT(hits, 150);
+}
+
+}  // namespace
+}  // namespace jfpx
