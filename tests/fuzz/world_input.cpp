@@ -1,8 +1,11 @@
 /// Bodies, forces and settings drawn from the bytes of a fuzzer.
 #include "tests/fuzz/world_input.hpp"
 
+#include <jfpx/error.hpp>
+
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -46,8 +49,31 @@ Compound draw_compound(Bytes& bytes) {
   return bytes.chance(Real(0.9)) ? centred(std::move(compound)) : compound;
 }
 
+/// A hull of up to twelve points. @throws InvalidArgument if they have none
+Hull draw_hull(Bytes& bytes) {
+  std::vector<Vec3> points;
+  for (std::uint64_t n = 4 + bytes.below(9); n > 0; --n) points.push_back(bytes.vector(-1, 1));
+  const Hull hull(points);
+  return bytes.chance(Real(0.9)) ? centred(hull) : hull;
+}
+
+/// Triangles of any vertices. @throws InvalidArgument for a coordinate that is out of range
+TriangleMesh draw_mesh(Bytes& bytes) {
+  TriangleMeshDef def;
+  for (std::uint64_t n = 3 + bytes.below(6); n > 0; --n) {
+    def.vertices.push_back(bytes.vector(-4, 4));
+  }
+  const auto vertex = [&] { return static_cast<std::uint32_t>(bytes.below(def.vertices.size())); };
+  for (std::uint64_t n = bytes.below(10); n > 0; --n) {
+    const std::uint32_t a = vertex(), b = vertex();
+    def.triangles.push_back({a, b, vertex()});
+  }
+  def.two_sided = bytes.chance(Real(0.5));
+  return TriangleMesh(std::move(def));
+}
+
 Shape draw_shape(Bytes& bytes) {
-  switch (bytes.below(8)) {
+  switch (bytes.below(12)) {
     case 0:
     case 1:
       return draw_box(bytes);
@@ -57,6 +83,21 @@ Shape draw_shape(Bytes& bytes) {
       return Plane{draw_direction(bytes), bytes.number(-2, 2)};
     case 4:
       return draw_compound(bytes);
+    case 8:
+      return Capsule{bytes.number(Real(0.1), 1), bytes.number(Real(0.1), 1)};
+    case 9:
+    case 10:
+      try {
+        return draw_hull(bytes);
+      } catch (const InvalidArgument&) {
+        return draw_sphere(bytes);
+      }
+    case 11:
+      try {
+        return draw_mesh(bytes);
+      } catch (const InvalidArgument&) {
+        return draw_box(bytes);
+      }
     default:
       return draw_sphere(bytes);
   }
@@ -88,8 +129,9 @@ BodyId draw_id(Bytes& bytes, std::span<const BodyId> bodies) {
 BodyDef draw_body(Bytes& bytes) {
   BodyDef def;
   def.shape = draw_shape(bytes);
-  const bool wall =
-      std::holds_alternative<HalfSpace>(def.shape) || std::holds_alternative<Plane>(def.shape);
+  const bool wall = std::holds_alternative<HalfSpace>(def.shape) ||
+                    std::holds_alternative<Plane>(def.shape) ||
+                    std::holds_alternative<TriangleMesh>(def.shape);
   def.mass = bytes.chance(wall ? Real(0.95) : Real(0.15)) ? Real(0) : bytes.number(Real(0.1), 5);
   def.kinematic = def.mass == 0 && bytes.chance(Real(0.3));
   if (bytes.chance(Real(0.1))) def.inertia = draw_matrix(bytes);
