@@ -42,7 +42,8 @@ void bind_scene(nb::module_& module) {
       .def("add_triangle_mesh",
            [](Scene& self, const Scene& body, const Rows<const Real>& vertices,
               const Rows<const std::uint32_t>& triangles, bool two_sided) {
-             TriangleMeshDef mesh{.two_sided = two_sided};
+             TriangleMeshDef mesh;
+             mesh.two_sided = two_sided;
              mesh.vertices.reserve(vertices.shape(0));
              for (std::size_t i = 0; i < vertices.shape(0); ++i) {
                mesh.vertices.push_back(vec3_at(vertices, i));
