@@ -51,7 +51,7 @@ class TriangleMesh {
   TriangleMesh() noexcept = default;
   /// Takes O(n log n) time.
   /// @throws InvalidArgument if a coordinate is out of range, an index is not that of a vertex, or
-  ///   there are more than 2^30 triangles
+  ///   there are more than 2^29 triangles
   JFPX_API explicit TriangleMesh(TriangleMeshDef def);
   JFPX_API TriangleMesh(std::vector<Vec3> vertices, std::vector<Triangle> triangles,
                         bool two_sided = false);

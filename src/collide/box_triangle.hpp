@@ -154,7 +154,7 @@ JFPX_HD inline LeastOverlap contact_axis(const BoxTriangle& pair, const Triangle
     if (are_parallel(overlap.normal, pair.normal)) return;
     if (best == &edges && faces.axis >= 0 && are_parallel(overlap.normal, faces.normal)) return;
     const int feature = supporting_feature(pair.corner, overlap);
-    if (feature == kFace && dot(overlap.normal, pair.normal) < 0) return;
+    if (feature == kFace) return;
     if (triangle.is_proximal(feature, axes * overlap.normal)) *best = overlap;
   });
   return preferred(preferred(normal, faces), edges);

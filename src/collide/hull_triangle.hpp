@@ -129,7 +129,7 @@ JFPX_HD inline bool find_contact_axis(const HullTriangle& pair, const TriangleIn
       return true;
     }
     const int feature = supporting_feature(pair.corner, overlap);
-    if (feature == kFace && dot(overlap.normal, pair.normal) < 0) return true;
+    if (feature == kFace) return true;
     if (triangle.is_proximal(feature, axes * overlap.normal)) *best = axis;
     return true;
   });
@@ -181,7 +181,7 @@ JFPX_HD void visit_contact_points(const HullTriangle& pair, const HullTriangleAx
     return (pair.flat_edges >> edge & 1) == 0;
   };
   const bool is_of_hull = axis.kind == HullTriangleAxis::face;
-  const int face = is_of_hull ? axis.first : facing_face(hull, pair.normal);
+  const int face = is_of_hull ? axis.first : incident_face(hull, pair.normal);
   const auto of_hull = make_face(
       hull.corner_count(face), [&](int k) { return hull.corner(face, k); }, hull.face_normal(face));
   const std::uint32_t faces =

@@ -118,9 +118,12 @@ template <class Visit>
 void visit_triangles_around(const MeshView& mesh, const Transform& pose, const Vec3& centre,
                             const Vec3& half_extents, const Visit& visit) {
   const Mat3 to_mesh = transposed(pose.basis);
-  const Vec3 half{projected_half_length(half_extents, to_mesh.row[0]),
-                  projected_half_length(half_extents, to_mesh.row[1]),
-                  projected_half_length(half_extents, to_mesh.row[2])};
+  // More than the rounding of the centre.
+  const Vec3 offset = centre - pose.origin;
+  const Real error = 64 * kEpsilon * (absolute(offset.x) + absolute(offset.y) + absolute(offset.z));
+  const Vec3 half{projected_half_length(half_extents, to_mesh.row[0]) + error,
+                  projected_half_length(half_extents, to_mesh.row[1]) + error,
+                  projected_half_length(half_extents, to_mesh.row[2]) + error};
   TreeTraversal::visit_around(mesh.tree, inverse_transform_point(pose, centre), half, visit);
 }
 

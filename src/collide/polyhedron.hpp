@@ -108,6 +108,31 @@ JFPX_HD int facing_face(const P& polyhedron, const Vec3& direction) {
   return face;
 }
 
+/// Among the faces at the vertex that is farthest against a direction, that whose outward normal is
+/// most opposite to the direction. The most opposite of all faces need not have this vertex.
+template <class P>
+JFPX_HD int incident_face(const P& polyhedron, const Vec3& direction) {
+  int deepest = 0;
+  Real lowest = dot(direction, polyhedron.vertex(0));
+  for (int i = 1; i < polyhedron.vertex_count(); ++i) {
+    const Real height = dot(direction, polyhedron.vertex(i));
+    if (height < lowest) lowest = height, deepest = i;
+  }
+  int face = -1;
+  Real least = 0;
+  const auto consider = [&](int i) {
+    const Real cosine = dot(direction, polyhedron.face_normal(i));
+    if (face < 0 || cosine < least || (cosine == least && i < face)) least = cosine, face = i;
+  };
+  for (int i = 0; i < polyhedron.edge_count(); ++i) {
+    const PolyhedronEdge edge = polyhedron.edge(i);
+    if (edge.a != deepest && edge.b != deepest) continue;
+    consider(edge.face);
+    consider(edge.other_face);
+  }
+  return face;
+}
+
 }  // namespace detail
 }  // namespace JFPX_ABI
 }  // namespace jfpx

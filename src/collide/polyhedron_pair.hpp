@@ -215,9 +215,9 @@ JFPX_HD void visit_contact_points(const PolyhedronPair<A, B>& pair, const Polyhe
   // The normal of the reference face points to the other polyhedron.
   const bool is_of_a = axis.kind == PolyhedronAxis::face_of_a;
   const Vec3 n = is_of_a ? -axis.overlap.normal : axis.overlap.normal;
-  const int face_a = is_of_a ? axis.first : facing_face(pair.a, n);
+  const int face_a = is_of_a ? axis.first : incident_face(pair.a, n);
   const int face_b =
-      is_of_a ? facing_face(pair.b, transform_transpose(pair.rotation, n)) : axis.first;
+      is_of_a ? incident_face(pair.b, transform_transpose(pair.rotation, n)) : axis.first;
   const auto of_a = make_face(
       pair.a.corner_count(face_a), [&](int k) { return pair.a.corner(face_a, k); },
       pair.a.face_normal(face_a));

@@ -22,7 +22,8 @@ using detail::kNoVertex;
 using detail::MeshData;
 using detail::MeshTriangle;
 
-constexpr std::size_t kMostTriangles = std::size_t{1} << 30;
+/// The ends of their edges have numbers of 32 bits.
+constexpr std::size_t kMostTriangles = std::size_t{1} << 29;
 /// Sine of the largest angle between triangles that are in the same plane. The surface of a box of
 /// 1 m is then at most 0.25 mm above an edge on which it has no point.
 constexpr double kFlatSine = 1e-3;

@@ -94,10 +94,12 @@ std::string find_coupled_fault(const BodyDef& def) {
   if (def.mass > 0 && std::holds_alternative<Plane>(def.shape)) {
     return fault("mass", def.mass, "0 for a plane, which divides the whole world");
   }
+  const auto* hull = std::get_if<Hull>(&def.shape);
+  if (hull != nullptr && def.mass > 0) found = find_centre_fault(*hull);
+  if (!found.empty()) return found;
   if (def.inertia) return find_inertia_fault(*def.inertia);
   if (def.mass > 0) found = find_inertia_fault(def.shape, def.mass);
   if (!found.empty() || def.mass == 0) return found;
-  if (const auto* hull = std::get_if<Hull>(&def.shape)) return find_centre_fault(*hull);
   const auto* compound = std::get_if<Compound>(&def.shape);
   return compound == nullptr ? found : find_centre_fault(*compound, def.mass);
 }

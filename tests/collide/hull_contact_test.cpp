@@ -150,6 +150,34 @@ TEST(HullContact, AHullOfABoxHasTheContactsOfTheBox) {
   EXPECT_GT(touching, 300);
 }
 
+/// The face that is most opposite to the ground need not have the lowest vertex.
+TEST(HullContact, ALongHullTouchesTheGroundWithItsLowestVertex) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  const TriangleMesh triangle({{-60, 0, -60}, {0, 0, 90}, {60, 0, -60}}, {{0, 1, 2}});
+  const Box floor{{20, 1, 20}};
+  const detail::MeshView ground = detail::view_of(triangle);
+  for (int n = 0; n < 2000; ++n) {
+    std::vector<Vec3> points;
+    for (std::uint64_t left = 5 + random.below(30); left > 0; --left) {
+      points.push_back(component_product(test::random_direction(&random), {0.3_r, 0.3_r, 1.2_r}));
+    }
+    const Hull hull = centred(Hull(points));
+    Transform pose = make_transform(test::random_rotation(&random), {});
+    Real lowest = 0;
+    for (const Vec3& v : hull.vertices()) lowest = std::min(lowest, (pose.basis * v).y);
+    pose.origin.y = -lowest - 0.005_r;
+    detail::PairManifold found;
+    find_contact_with_triangle(detail::instance(hull, pose), ground, 0, {}, {}, &found);
+    ASSERT_GT(found.touch_count, 0u) << n;
+    ASSERT_NEAR(deepest(found), -0.005_r, 1e-4_r) << n;
+    const detail::PairManifold on_box = contact_of(hull, pose, floor, {{}, {0, -1, 0}});
+    ASSERT_GT(on_box.touch_count, 0u) << n;
+    ASSERT_NEAR(deepest(on_box), -0.005_r, 2e-4_r) << n;
+  }
+}
+
 TEST(HullContact, OnAHalfSpaceTheLowestVerticesTouch) {
   Random random(7);
   for (int n = 0; n < 300; ++n) {

@@ -10,11 +10,12 @@ void FixedTrees::set_bodies(const SubShapeTable& table, const SweptBounds& bound
   const SubShapeRanges& ranges = table.ranges();
   next_keys_.clear();
   for (std::uint32_t i = ranges.fixed_begin(); i < ranges.bounded(); ++i) {
-    next_keys_.push_back({bounds.sub_shapes.solid(i), false});
+    const PosedSolid& posed = bounds.sub_shapes.solid(i);
+    next_keys_.push_back({posed, posed.solid.hull != nullptr ? posed.solid.hull->serial : 0});
   }
   for (const std::uint32_t i : table.kinematic()) {
     Key& key = next_keys_[i - ranges.fixed_begin()];
-    key = {{key.solid.solid, {}}, true};
+    key = {{key.solid.solid, {}}, key.hull, true};
   }
   if (next_keys_ == keys_ && margin_ == bounds.largest_margin) return move_kinematic(bounds);
   std::swap(keys_, next_keys_);

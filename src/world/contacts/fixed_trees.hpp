@@ -26,6 +26,7 @@ class FixedTrees {
   /// Identity of a solid of mass 0 in the tree; the pose of a kinematic solid is ignored.
   struct Key {
     PosedSolid solid;
+    std::uint64_t hull = 0;  ///< HullView::serial, because another hull may have the same address
     bool is_kinematic = false;
     friend bool operator==(const Key&, const Key&) = default;
   };

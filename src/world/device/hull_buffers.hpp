@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <utility>
 #include <vector>
 
 namespace jfpx {
@@ -26,19 +27,20 @@ class HullBuffers {
   void move_to_device(const Transfer<Device>& transfer, detail::Solid* solid) {
     if (solid->hull == nullptr) return;
     const detail::HullView& hull = *solid->hull;
-    Copy& copy = copies_[hull.serial];
-    if (copy.words.empty()) put(transfer, hull, &copy);
-    solid->hull = reinterpret_cast<const detail::HullView*>(copy.buffer.data());
+    auto found = copies_.find(hull.serial);
+    if (found == copies_.end()) {
+      Words copy;
+      put(transfer, hull, &copy);
+      found = copies_.emplace(hull.serial, std::move(copy)).first;
+    }
+    solid->hull = reinterpret_cast<const detail::HullView*>(found->second.data());
   }
 
  private:
-  struct Copy {
-    typename Device::template Buffer<std::uint64_t> buffer;
-    std::vector<std::uint64_t> words;
-  };
+  using Words = typename Device::template Buffer<std::uint64_t>;
 
   /// All arrays of a hull are in one buffer, behind its view.
-  static void put(const Transfer<Device>& transfer, const detail::HullView& hull, Copy* copy) {
+  static void put(const Transfer<Device>& transfer, const detail::HullView& hull, Words* copy) {
     std::size_t size = words_of<detail::HullView>(1);
     const auto reserve = [&size]<class T>(const T*, std::size_t count) {
       const std::size_t place = size;
@@ -49,9 +51,8 @@ class HullBuffers {
     const std::size_t faces = reserve(hull.faces, hull.face_count);
     const std::size_t corners = reserve(hull.corners, hull.corner_count);
     const std::size_t edges = reserve(hull.edges, hull.edge_count);
-    std::vector<std::uint64_t>& words = copy->words;
-    words.assign(size, 0);
-    const std::uint64_t* const base = transfer.room(&copy->buffer, size);
+    std::vector<std::uint64_t> words(size);
+    const std::uint64_t* const base = transfer.room(copy, size);
     detail::HullView view = hull;
     const auto fill = [&]<class T>(std::size_t place, const T* from, std::size_t count) {
       std::memcpy(&words[place], from, count * sizeof(T));
@@ -62,7 +63,7 @@ class HullBuffers {
     view.corners = fill(corners, hull.corners, hull.corner_count);
     view.edges = fill(edges, hull.edges, hull.edge_count);
     std::memcpy(words.data(), &view, sizeof view);
-    transfer.put(&copy->buffer, words.data(), size);
+    transfer.put(copy, words.data(), size);
     transfer.wait();
   }
   template <class T>
@@ -70,7 +71,7 @@ class HullBuffers {
     return (count * sizeof(T) + sizeof(std::uint64_t) - 1) / sizeof(std::uint64_t);
   }
 
-  std::map<std::uint64_t, Copy> copies_;  ///< by HullView::serial
+  std::map<std::uint64_t, Words> copies_;  ///< by HullView::serial
 };
 
 }  // namespace device

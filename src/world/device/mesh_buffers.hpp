@@ -55,7 +55,8 @@ class MeshBuffers {
       found->in_use = true;
       return found->view;
     }
-    Copy& copy = copies_.emplace_back();
+    std::list<Copy> made(1);  // kept only once it is complete
+    Copy& copy = made.back();
     copy.data = mesh.data();
     const detail::MeshView from = copy.data->view();
     copy.view = from;
@@ -65,6 +66,7 @@ class MeshBuffers {
         transfer.put(&copy.first_neighbor, from.first_neighbor, from.vertex_count + 1);
     copy.view.neighbors = transfer.put(&copy.neighbors, from.neighbors, from.neighbor_count);
     copy.view.tree = copy.tree.upload(transfer, from.tree);
+    copies_.splice(copies_.end(), made);
     return copy.view;
   }
 
