@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
-#include <utility>
 #include <vector>
 
 namespace jfpx {
@@ -29,9 +28,9 @@ class HullBuffers {
     const detail::HullView& hull = *solid->hull;
     auto found = copies_.find(hull.serial);
     if (found == copies_.end()) {
-      Words copy;
-      put(transfer, hull, &copy);
-      found = copies_.emplace(hull.serial, std::move(copy)).first;
+      std::map<std::uint64_t, Words> made;  // kept only once it is complete
+      put(transfer, hull, &made[hull.serial]);
+      found = copies_.insert(made.extract(made.begin())).position;
     }
     solid->hull = reinterpret_cast<const detail::HullView*>(found->second.data());
   }
