@@ -53,7 +53,7 @@ constexpr Pin kSoftStepPins[] = {
     {"polydisperse", 100, 60, 0xd62f77d75c6f7d7eu, 0x367a150899394731u},
     {"mixed", 40, 150, 0x48b7fa58e62d9457u, 0x7c50a4c7f0e4e2e3u},
     {"capsules", 20, 200, 0xf850f72371f8bf3bu, 0xfd0063eb7708ddedu},
-    {"terrain", 20, 200, 0x1a20a4ad4ffe33bdu, 0xb343ff80b3b21cf5u},
+    {"terrain", 20, 200, 0xd9b57e102622d7b0u, 0x675d7a9c7a9d66acu},
     {"bridge", 30, 200, 0x0fa9033331da8651u, 0xbab82dbf31cf057fu},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
