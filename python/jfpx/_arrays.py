@@ -127,7 +127,11 @@ def rows(array: Any, name: str, columns: int, dtype: Any = None) -> np.ndarray:
 
 def indices(array: Any, name: str, columns: int) -> np.ndarray:
     """An array of shape (N, columns) of integers in [0, 2^32 - 1], as uint32."""
-    array = to_host(array if hasattr(array, "dtype") else plain_numbers(array, name), name)
+    if hasattr(array, "dtype"):
+        array = to_host(array, name)
+    else:
+        plain_numbers(array, name)  # refuses booleans and texts
+        array = np.asarray(array)
     if array.ndim != 2 or array.shape[1] != columns:
         raise InvalidArgument(f"{name} has shape {array.shape}; it must be (N, {columns})")
     if array.dtype.kind not in "iu":
