@@ -224,8 +224,12 @@ void count_buffer_data(GLenum target, GLsizeiptr size, const void* data, GLenum 
 TEST_F(MeshPictureTest, AMeshIsUploadedOnceForAllBodiesAndPictures) {
   auto mesh = std::make_unique<TriangleMesh>(test::terrain(40, 1, flat));
   MeshModels models;
-  glFinish();  // resolves the function
-  models.upload({});
+  // The first call of a function resolves its pointer, so it must precede the exchange.
+  GLuint buffer = 0;
+  glGenBuffers(1, &buffer);
+  glBindBuffer(GL_ARRAY_BUFFER, buffer);
+  glBufferData(GL_ARRAY_BUFFER, 4, nullptr, GL_STATIC_DRAW);
+  glDeleteBuffers(1, &buffer);
   const auto upload = [&](int bodies) {
     Drawing drawing({0, 10, 0});
     for (int i = 0; i < bodies; ++i) drawing.add_mesh(*mesh, {Real(i), 0, 0}, {}, 1, kGrey);
