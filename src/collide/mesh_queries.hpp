@@ -36,7 +36,7 @@ class MeshRay {
   Real hit(const MeshView& mesh, std::uint32_t index) const {
     const MeshTriangle& triangle = mesh.triangles[index];
     if (mesh.two_sided == 0 && !(dot(triangle.normal, direction_) < 0)) return -1;
-    Real x[3], y[3], z[3];
+    Real x[3] = {}, y[3] = {}, z[3] = {};
     for (int k = 0; k < 3; ++k) {
       const Vec3 corner = mesh.vertices[triangle.vertices[k]] - origin_;
       x[k] = corner[across_] - shear_across_ * corner[along_];

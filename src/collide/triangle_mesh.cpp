@@ -144,7 +144,7 @@ class Builder {
     const auto key = [this](std::uint32_t i) {
       std::array<std::uint32_t, 3> v{};
       std::ranges::copy(mesh_.triangles[i].vertices, v.begin());
-      std::ranges::rotate(v, std::ranges::min_element(v));
+      std::rotate(v.begin(), std::ranges::min_element(v), v.end());
       if (mesh_.def.two_sided && v[1] > v[2]) std::swap(v[1], v[2]);
       return v;
     };

@@ -30,9 +30,10 @@ MassProperties mass_properties(const Compound& compound, Real mass) {
   for_each_share(compound, [&](const CompoundPart& part, Real share) {
     const Real part_mass = mass * share;
     const Mat3 axes = to_matrix(normalized(part.orientation));
-    const auto add = [&]<class S>(const S& shape) {
+    const auto add = [&](const auto& shape) {
       Vec3 centre = part.position;
-      if constexpr (std::is_same_v<S, Hull>) centre += axes * shape.centre_of_mass();
+      if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, Hull>)
+        centre += axes * shape.centre_of_mass();
       const Mat3 rotated = detail::in_world_axes(detail::central_inertia(shape, part_mass), axes);
       sum.centre += centre * share;
       sum.inertia = sum.inertia + rotated + detail::parallel_axis(centre, part_mass);

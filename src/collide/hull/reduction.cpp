@@ -149,7 +149,8 @@ VertexSelection select_vertices(std::span<const GridPoint> points, double tolera
   std::vector<GridPoint> chosen;
   for (const int i : selection.vertices) chosen.push_back(points[static_cast<std::size_t>(i)]);
   std::vector<int> kept;
-  for (const int i : HullReduction(std::move(chosen), tolerance).run()) {
+  const std::vector<int> left = HullReduction(std::move(chosen), tolerance).run();
+  for (const int i : left) {
     kept.push_back(selection.vertices[static_cast<std::size_t>(i)]);
   }
   selection.vertices = std::move(kept);
