@@ -36,7 +36,7 @@ class MeshRay {
   Real hit(const MeshView& mesh, std::uint32_t index) const {
     const MeshTriangle& triangle = mesh.triangles[index];
     if (mesh.two_sided == 0 && !(dot(triangle.normal, direction_) < 0)) return -1;
-    Real x[3] = {}, y[3] = {}, z[3] = {};
+    Vec3 x, y, z;
     for (int k = 0; k < 3; ++k) {
       const Vec3 corner = mesh.vertices[triangle.vertices[k]] - origin_;
       x[k] = corner[across_] - shear_across_ * corner[along_];
@@ -64,7 +64,7 @@ class MeshRay {
 
  private:
   /// Multiplies by a power of two, so that products of small numbers do not underflow.
-  static void scale(Real (&x)[3], Real (&y)[3]) {
+  static void scale(Vec3& x, Vec3& y) {
     Real most = 0;
     for (int k = 0; k < 3; ++k) most = std::max({most, absolute(x[k]), absolute(y[k])});
     if (!(most > 0 && most < Real(1e-8))) return;
@@ -75,8 +75,8 @@ class MeshRay {
       y[k] = std::ldexp(y[k], -exponent);
     }
   }
-  static bool have_same_sign(const Real (&x)[3]) {
-    return (x[0] > 0 && x[1] > 0 && x[2] > 0) || (x[0] < 0 && x[1] < 0 && x[2] < 0);
+  static bool have_same_sign(const Vec3& v) {
+    return (v.x > 0 && v.y > 0 && v.z > 0) || (v.x < 0 && v.y < 0 && v.z < 0);
   }
 
   Vec3 origin_, direction_;
