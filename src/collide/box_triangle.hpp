@@ -5,21 +5,21 @@
 #pragma once
 
 #include "src/collide/box_pair.hpp"
-#include "src/collide/mesh_triangle.hpp"
+#include "src/collide/triangle_axis.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
 /// A triangle in the axes of a box, whose centre is the origin.
-struct BoxTriangle {
+struct BoxTriangle : LocalTriangle {
   Vec3 half;
-  Vec3 corner[3];  ///< [m]
-  Vec3 normal;     ///< unit, to the side of the box
-  std::uint32_t flat_edges = 0;
-  Real size = 0;  ///< [m], the scale of the rounding errors
 
-  JFPX_HD Vec3 edge(int k) const { return corner[next_corner(k)] - corner[k]; }
+  /// The axes: kFaceAxis + i is axis i of the box, and kEdgeAxis + 3 i + k is the cross product of
+  /// that axis and edge k of the triangle.
+  static constexpr int kEdgeAxis = kFaceAxis + 3;
+
+  JFPX_HD Real lowest(const Vec3& axis) const { return -projected_half_length(half, axis); }
 };
 
 /// @param shift [m], world axes, motion of the box since the start of the step
@@ -27,46 +27,29 @@ JFPX_HD inline BoxTriangle make_box_triangle(const Box& box, const Mat3& axes,
                                              const TriangleInstance& triangle, const Vec3& shift) {
   BoxTriangle result;
   result.half = box.half_extents;
-  result.normal = transform_transpose(axes, triangle.normal);
-  result.flat_edges = triangle.triangle->flat_edges;
-  Real farthest = 0;
-  for (int k = 0; k < 3; ++k) {
-    result.corner[k] = transform_transpose(axes, triangle.corner[k] - shift);
-    const Real distance = length(result.corner[k]);
-    farthest = distance > farthest ? distance : farthest;
-  }
-  result.size = length(box.half_extents) + farthest;
+  result.place(axes, triangle, shift, {}, length(box.half_extents));
   return result;
 }
-
-/// The axes of a box and a triangle: 0 is the normal of the triangle, 1 + i is axis i of the box,
-/// and 4 + 3 i + k is the cross product of that axis and edge k of the triangle.
-inline constexpr int kBoxAxis = 1, kEdgeAxis = 4;
 
 /// Distance of the box from the triangle along an axis.
 /// @param axis unit
 JFPX_HD inline LeastOverlap overlap_along(const BoxTriangle& pair, int index, const Vec3& axis,
                                           Real error) {
   const Real half = projected_half_length(pair.half, axis);
-  const Real p = dot(axis, pair.corner[0]), q = dot(axis, pair.corner[1]),
-             r = dot(axis, pair.corner[2]);
-  const Real lower = p < q ? p : q, upper = p < q ? q : p;
-  const Real above = (r < lower ? r : lower) - half, below = -(r > upper ? r : upper) - half;
+  const Real above = -pair.support(-axis) - half, below = -pair.support(axis) - half;
   if (above > below) return {index, above, error, -axis};
   return {index, below, error, axis};
 }
-JFPX_HD inline LeastOverlap overlap_along_normal(const BoxTriangle& pair) {
-  const Real height = -dot(pair.normal, pair.corner[0]);
-  return {0, height - projected_half_length(pair.half, pair.normal), 8 * kEpsilon * pair.size,
-          pair.normal};
-}
 
-/// Calls visit(overlap) for all axes except the normal of the triangle. Edges that are nearly
-/// parallel have no axis: see least_overlap().
+/// Calls visit(overlap), until it returns false, for all axes except the normal of the triangle.
+/// Edges that are nearly parallel have no axis: see least_overlap().
+/// @returns false if a call did
 template <class Visit>
-JFPX_HD void for_each_axis(const BoxTriangle& pair, const Visit& visit) {
-  const Real error = 8 * kEpsilon * pair.size;
-  for (int i = 0; i < 3; ++i) visit(overlap_along(pair, kBoxAxis + i, unit_axis(i), error));
+JFPX_HD bool for_each_axis(const BoxTriangle& pair, const Visit& visit) {
+  const Real error = pair.error();
+  for (int i = 0; i < 3; ++i) {
+    if (!visit(overlap_along(pair, kFaceAxis + i, unit_axis(i), error))) return false;
+  }
   for (int k = 0; k < 3; ++k) {
     const Vec3 edge = pair.edge(k);
     const Real size2 = length_squared(edge);
@@ -75,101 +58,13 @@ JFPX_HD void for_each_axis(const BoxTriangle& pair, const Visit& visit) {
       const Real across2 = length_squared(axis);
       if (!(across2 > 4 * kEpsilon * size2)) continue;
       const Real scale = Real(1) / square_root(across2);
-      visit(overlap_along(pair, kEdgeAxis + 3 * i + k, axis * scale,
-                          error * (square_root(size2) * scale)));
+      if (!visit(overlap_along(pair, BoxTriangle::kEdgeAxis + 3 * i + k, axis * scale,
+                               error * (square_root(size2) * scale)))) {
+        return false;
+      }
     }
   }
-}
-
-/// False if an axis separates the shapes by more than `limit`. Otherwise writes the axis of the
-/// largest separation, or of least overlap.
-JFPX_HD inline bool widest_separation(const BoxTriangle& pair, Real limit, LeastOverlap* widest) {
-  *widest = overlap_along_normal(pair);
-  if (widest->distance > limit) return false;
-  bool is_near = true;
-  for_each_axis(pair, [&](const LeastOverlap& overlap) {
-    if (overlap.distance > widest->distance) *widest = overlap;
-    if (overlap.distance > limit) is_near = false;
-  });
-  return is_near;
-}
-
-/// Axes within a degree of each other form the same contact.
-JFPX_HD inline bool are_parallel(const Vec3& a, const Vec3& b) {
-  constexpr Real kParallelCosine = Real(0.9998);
-  return dot(a, b) > kParallelCosine;
-}
-
-/// The feature of a triangle that is closest to a solid along the normal of an overlap. An edge
-/// within a degree of a right angle to the normal is closest with both ends: a solid rests on it
-/// with a face.
-JFPX_HD inline int supporting_feature(const Vec3 (&corner)[3], const LeastOverlap& overlap) {
-  Real height[3];
-  for (int k = 0; k < 3; ++k) height[k] = dot(overlap.normal, corner[k]);
-  constexpr Real kSine = Real(0.02);
-  int top = 0;
-  for (int k = 1; k < 3; ++k) top = height[k] > height[top] ? k : top;
-  int count = 0, below = 0;
-  for (int k = 0; k < 3; ++k) {
-    const Real drop = height[top] - height[k], error = 8 * overlap.error;
-    const bool supports =
-        drop <= error || drop * drop <= kSine * kSine * length_squared(corner[top] - corner[k]);
-    count += supports ? 1 : 0;
-    if (!supports) below = k;
-  }
-  if (count == 3) return kFace;
-  return count == 2 ? kEdge + next_corner(below) : kVertex + top;
-}
-
-/// Whether the box is closer to the face of a neighbor at a convex edge, which then has the
-/// contact, than to the face of the triangle.
-JFPX_HD inline bool is_nearer_to_neighbor(const BoxTriangle& pair, const TriangleInstance& triangle,
-                                          const Mat3& axes, const LeastOverlap& normal) {
-  bool is_nearer = false;
-  triangle.visit_convex_neighbors([&](const Vec3& n) {
-    const Vec3 axis = transform_transpose(axes, n);
-    Real most = -kMaxReal;
-    for (int k = 0; k < 3; ++k) {
-      const Real height = dot(axis, pair.corner[k]);
-      most = height > most ? height : most;
-    }
-    LeastOverlap neighbor{0, -most - projected_half_length(pair.half, axis), normal.error, axis};
-    is_nearer |= &preferred(normal, neighbor) == &neighbor;
-  });
-  return is_nearer;
-}
-
-/// The axis of the contact: that of least overlap among the proximal normals of the mesh. The
-/// normal of the triangle is preferred to axes of the box, and these to edges; axes within a degree
-/// of the normal of the triangle do not replace it, so that a box that rests on a flat mesh has the
-/// same normal on all triangles.
-JFPX_HD inline LeastOverlap contact_axis(const BoxTriangle& pair, const TriangleInstance& triangle,
-                                         const Mat3& axes) {
-  const LeastOverlap normal = overlap_along_normal(pair);
-  LeastOverlap faces, edges;
-  for_each_axis(pair, [&](const LeastOverlap& overlap) {
-    LeastOverlap* best = overlap.axis < kEdgeAxis ? &faces : &edges;
-    if (best->axis >= 0 && !(overlap.distance > best->distance)) return;
-    if (!(overlap.distance > normal.distance)) return;
-    if (are_parallel(overlap.normal, pair.normal)) return;
-    if (best == &edges && faces.axis >= 0 && are_parallel(overlap.normal, faces.normal)) return;
-    const int feature = supporting_feature(pair.corner, overlap);
-    if (feature == kFace) return;
-    if (triangle.is_proximal(feature, axes * overlap.normal)) *best = overlap;
-  });
-  return preferred(preferred(normal, faces), edges);
-}
-
-/// Whether an overlap along the normal of the triangle is that of a contact. The best axis may be
-/// no proximal normal: a neighbor is closer to the box in this direction. If the shapes are
-/// separated, the triangle has no contact then.
-JFPX_HD inline bool is_contact(const BoxTriangle& pair, const TriangleInstance& triangle,
-                               const Mat3& axes, const LeastOverlap& chosen,
-                               const LeastOverlap& widest) {
-  if (&preferred(chosen, widest) == &chosen) return true;
-  if (are_parallel(chosen.normal, widest.normal)) return true;
-  if (widest.distance > 0 && chosen.distance < 0) return false;
-  return chosen.axis != 0 || !is_nearer_to_neighbor(pair, triangle, axes, chosen);
+  return true;
 }
 
 /// The part of a polygon where dot(normal, p) <= limit.
@@ -211,7 +106,7 @@ JFPX_HD inline void points_on_triangle(const BoxTriangle& pair, Real margin, Man
     if (dot(outward, third - pair.corner[k]) > 0) outward = -outward;
     // A corner exactly above the edge must not be lost by rounding.
     const bool is_flat = (pair.flat_edges >> k & 1) != 0;
-    const Real slack = is_flat ? 8 * kEpsilon * pair.size * length(outward) : Real(0);
+    const Real slack = is_flat ? pair.error() * length(outward) : Real(0);
     polygon =
         clipped(polygon, outward, dot(outward, pair.corner[k]) + slack, kPlanes + k, &corners);
   }
@@ -270,15 +165,13 @@ JFPX_HD inline Vec3 edge_point(const BoxTriangle& pair, int i, int k, const Leas
 
 /// The contact manifold of a box and a triangle, in the axes of the box. The normal points from the
 /// triangle to the box.
-/// @param widest widest_separation()
+/// @param least  of find_contact_axis()
 /// @param margin largest distance of a point of the manifold
-JFPX_HD inline Manifold triangle_manifold(const BoxTriangle& pair, const TriangleInstance& triangle,
-                                          const Mat3& axes, const LeastOverlap& widest,
+JFPX_HD inline Manifold triangle_manifold(const BoxTriangle& pair, const LeastOverlap& least,
                                           Real margin) {
   constexpr std::uint32_t kFeaturesOfFace = 6 * 64;
-  const LeastOverlap least = contact_axis(pair, triangle, axes);
+  constexpr int kEdgeAxis = BoxTriangle::kEdgeAxis;
   Manifold manifold;
-  if (!is_contact(pair, triangle, axes, least, widest)) return manifold;
   manifold.distance = least.distance;
   manifold.normal = least.normal;
   std::uint32_t first_feature = 0;
@@ -286,7 +179,7 @@ JFPX_HD inline Manifold triangle_manifold(const BoxTriangle& pair, const Triangl
     points_on_triangle(pair, margin, &manifold);
   } else if (least.axis < kEdgeAxis) {
     first_feature = kFeaturesOfFace;
-    const int face = least.axis - kBoxAxis;
+    const int face = least.axis - kFaceAxis;
     points_on_box(pair, face, least.normal[face] > 0 ? Real(-1) : Real(1), margin, &manifold);
   } else if (least.distance <= margin) {
     first_feature = 2 * kFeaturesOfFace;

@@ -58,6 +58,25 @@ struct Segment {
     return t > half_length ? half_length : t < -half_length ? -half_length : t;
   }
 };
+/// A part of a segment, as a range of its parameter; empty if lower > upper.
+struct SegmentPart {
+  Real lower = 0, upper = 0;
+
+  JFPX_HD explicit SegmentPart(const Segment& segment)
+      : lower(-segment.half_length), upper(segment.half_length) {}
+  /// Clips the part to parameters t with height + t * climb <= 0 (Cyrus and Beck 1978).
+  /// @returns false if a segment parallel to the plane is outside
+  JFPX_HD bool clip(Real height, Real climb) {
+    if (climb == 0) return !(height > 0);
+    const Real at = -height / climb;
+    if (climb < 0) {
+      lower = at > lower ? at : lower;
+    } else {
+      upper = at < upper ? at : upper;
+    }
+    return true;
+  }
+};
 JFPX_HD inline Segment axis_of(const Posed<Capsule>& capsule) {
   return {capsule.pose.origin, capsule.pose.basis.column(1), capsule.shape.half_height};
 }
@@ -194,6 +213,25 @@ inline constexpr std::uint32_t kLowerPoint = 0, kUpperPoint = 1, kSinglePoint = 
 /// [-], fraction of the radius. Two points replace the closest points only if one of them is as
 /// deep as these up to this tolerance.
 inline constexpr Real kNearlyDeepest = Real(0.01);
+
+/// The normal of a capsule's contact within 3 degrees of that of a face makes it a contact with the
+/// face.
+inline constexpr Real kRestingCosine = Real(0.998);
+
+/// Adds the ends of the part of a capsule's axis above a face, unless an end beside the face is
+/// deeper.
+/// @param distance [m], of the axis from the other shape
+/// @param height   function from a parameter to the height above the face [m]
+/// @param add      receives parameter, height and feature of a point, in this order
+template <class Height, class Add>
+JFPX_HD void add_ends(const SegmentPart& part, Real distance, Real radius, const PairMotion& pair,
+                      const Height& height, const Add& add) {
+  const Real low = height(part.lower), high = height(part.upper);
+  if (!((low < high ? low : high) <= distance + kNearlyDeepest * radius)) return;
+  const Real highest = pair.margin + radius;
+  if (low <= highest) add(part.lower, low, kLowerPoint);
+  if (high <= highest && part.upper > part.lower) add(part.upper, high, kUpperPoint);
+}
 
 /// Parameters of the closest points of two segments (Ericson 2005, 5.1.9).
 struct ClosestPoints {
@@ -346,7 +384,6 @@ JFPX_HD inline void find_depth(const Box& box, CapsuleOnBox* state) {
 /// closest points.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Box>& b,
                                  const PairMotion& pair, PairManifold* manifold) {
-  constexpr Real kParallelCosine = Real(0.998);
   const Mat3& axes = b.pose.basis;
   const Real size = length(b.shape.half_extents) + a.shape.half_height;
   CapsuleOnBox state;
@@ -377,32 +414,26 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<Box>& b,
     if (absolute(state.normal[i]) > absolute(state.normal[face])) face = i;
   }
   // The part of the axis above the face.
-  Real lower = -segment.half_length, upper = segment.half_length;
+  SegmentPart part(segment);
   for (int k = 1; k < 3; ++k) {
     const int i = (face + k) % 3;
     const Real h = b.shape.half_extents[i], along = segment.axis[i];
     if (along == 0) {
-      if (absolute(segment.centre[i]) > h) lower = 1, upper = 0;
+      if (absolute(segment.centre[i]) > h) part.lower = 1, part.upper = 0;
       continue;
     }
     const Real first = (-h - segment.centre[i]) / along, last = (h - segment.centre[i]) / along;
     const Real enters = first < last ? first : last, leaves = first < last ? last : first;
-    lower = enters > lower ? enters : lower;
-    upper = leaves < upper ? leaves : upper;
+    part.lower = enters > part.lower ? enters : part.lower;
+    part.upper = leaves < part.upper ? leaves : part.upper;
   }
-  if (absolute(state.normal[face]) > kParallelCosine && lower <= upper) {
+  if (absolute(state.normal[face]) > kRestingCosine && part.lower <= part.upper) {
     const Real side = state.normal[face] < 0 ? Real(-1) : Real(1);
+    manifold->normal = axes.column(face) * side;
     const auto height = [&](Real at) {
       return side * segment.point(at)[face] - b.shape.half_extents[face];
     };
-    const Real low = height(lower), high = height(upper);
-    // Exception: an end beside the face is deeper.
-    if ((low < high ? low : high) <= state.distance + kNearlyDeepest * a.shape.radius) {
-      const Real highest = pair.margin + a.shape.radius;
-      manifold->normal = axes.column(face) * side;
-      if (low <= highest) add(lower, low, kLowerPoint);
-      if (high <= highest && upper > lower) add(upper, high, kUpperPoint);
-    }
+    add_ends(part, state.distance, a.shape.radius, pair, height, add);
   }
   if (manifold->point_count > 0) return;
   manifold->normal = axes * state.normal;

@@ -200,22 +200,22 @@ JFPX_HD inline void find_contact(const Posed<HullReference>& a, const TriangleIn
                                  const PairMotion& pair, PairManifold* manifold) {
   const Mat3& axes = a.pose.basis;
   HullTriangle triangle;
-  HullTriangleAxis widest;
+  LeastOverlap widest;
   Real t = 0;
   const auto separation_at = [&](Real part) -> Separation {
     triangle = make_hull_triangle(*a.shape.hull, axes, b, pair.motion * part);
     if (!widest_separation(triangle, pair.limit, &widest)) return {{}, 0, false};
-    return {axes * widest.overlap.normal, widest.overlap.distance};
+    return {axes * widest.normal, widest.distance};
   };
   if (!advance(pair, separation_at, &t)) return;
-  HullTriangleAxis axis;
+  LeastOverlap axis;
   if (!find_contact_axis(triangle, b, axes, widest, &axis)) return;
-  PointSelection selection(axis.overlap.normal);
+  PointSelection selection(axis.normal);
   visit_contact_points(triangle, axis, pair.margin,
                        [&](const Vec3& p, Real distance, std::uint32_t feature) {
                          selection.add(p, distance, feature);
                        });
-  manifold->normal = axes * axis.overlap.normal;
+  manifold->normal = axes * axis.normal;
   add_selected(selection, a.pose, pair.motion * t, pair, manifold);
 }
 
@@ -267,22 +267,12 @@ JFPX_HD inline void find_depth(const HullPolyhedron& hull, CapsuleOnHull* state)
 
 /// Whether a segment intersects a hull.
 JFPX_HD inline bool intersects(const HullPolyhedron& hull, const Segment& s) {
-  Real lower = -s.half_length, upper = s.half_length;
+  SegmentPart part(s);
   for (int i = 0; i < hull.face_count(); ++i) {
     const Vec3 n = hull.face_normal(i);
-    const Real height = dot(n, s.centre) - hull.face_offset(i), climb = dot(n, s.axis);
-    if (climb == 0) {
-      if (height > 0) return false;
-      continue;
-    }
-    const Real at = -height / climb;
-    if (climb < 0) {
-      lower = at > lower ? at : lower;
-    } else {
-      upper = at < upper ? at : upper;
-    }
+    if (!part.clip(dot(n, s.centre) - hull.face_offset(i), dot(n, s.axis))) return false;
   }
-  return lower <= upper;
+  return part.lower <= part.upper;
 }
 
 JFPX_HD inline void find_closest(const HullView& view, CapsuleOnHull* state) {
@@ -313,29 +303,17 @@ JFPX_HD inline void find_closest(const HullView& view, CapsuleOnHull* state) {
   state->distance = least;
 }
 
-/// The part of a segment above a face. @returns false if there is none
+/// Clips a segment to the part above a face. @returns false if there is none
 JFPX_HD inline bool clip_to_face(const HullPolyhedron& hull, int face, const Segment& segment,
-                                 Real* lower, Real* upper) {
-  *lower = -segment.half_length;
-  *upper = segment.half_length;
+                                 SegmentPart* part) {
   const Vec3 n = hull.face_normal(face);
   const int count = hull.corner_count(face);
   for (int k = 0; k < count; ++k) {
     const Vec3 from = hull.corner(face, k), to = hull.corner(face, k + 1 == count ? 0 : k + 1);
     const Vec3 outward = cross(to - from, n);
-    const Real height = dot(outward, segment.centre - from), climb = dot(outward, segment.axis);
-    if (climb == 0) {
-      if (height > 0) return false;
-      continue;
-    }
-    const Real at = -height / climb;
-    if (climb < 0) {
-      *lower = at > *lower ? at : *lower;
-    } else {
-      *upper = at < *upper ? at : *upper;
-    }
+    if (!part->clip(dot(outward, segment.centre - from), dot(outward, segment.axis))) return false;
   }
-  return *lower <= *upper;
+  return part->lower <= part->upper;
 }
 
 /// A capsule and a hull. If the normal is within 3 degrees of a face normal, the points are the
@@ -343,7 +321,6 @@ JFPX_HD inline bool clip_to_face(const HullPolyhedron& hull, int face, const Seg
 /// the closest points.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<HullReference>& b,
                                  const PairMotion& pair, PairManifold* manifold) {
-  constexpr Real kParallelCosine = Real(0.998);
   const Mat3& axes = b.pose.basis;
   const HullPolyhedron hull{b.shape.hull};
   const Real radius = a.shape.radius;
@@ -365,17 +342,11 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const Posed<HullRefere
   };
   const int face = facing_face(hull, -state.normal);
   const Vec3 n = hull.face_normal(face);
-  Real lower = 0, upper = 0;
-  if (dot(n, state.normal) > kParallelCosine && clip_to_face(hull, face, segment, &lower, &upper)) {
+  SegmentPart part(segment);
+  if (dot(n, state.normal) > kRestingCosine && clip_to_face(hull, face, segment, &part)) {
+    manifold->normal = axes * n;
     const auto height = [&](Real at) { return dot(n, segment.point(at)) - hull.face_offset(face); };
-    const Real low = height(lower), high = height(upper);
-    // Exception: an end beside the face is deeper.
-    if ((low < high ? low : high) <= state.distance + kNearlyDeepest * radius) {
-      const Real highest = pair.margin + radius;
-      manifold->normal = axes * n;
-      if (low <= highest) add(lower, low, kLowerPoint);
-      if (high <= highest && upper > lower) add(upper, high, kUpperPoint);
-    }
+    add_ends(part, state.distance, radius, pair, height, add);
   }
   if (manifold->point_count > 0) return;
   manifold->normal = axes * state.normal;

@@ -45,32 +45,18 @@ struct CapsuleOnTriangle {
   int feature = kFace;
 };
 
-/// The part of a segment above the face of a triangle.
-/// @returns false if there is none
+/// Clips a segment to the part above the face of a triangle. @returns false if there is none
 JFPX_HD inline bool clip_to_face(const Segment& segment, const TriangleInstance& triangle,
-                                 Real* lower, Real* upper) {
-  *lower = -segment.half_length;
-  *upper = segment.half_length;
+                                 SegmentPart* part) {
   for (int k = 0; k < 3; ++k) {
     const Vec3 edge = triangle.corner[next_corner(k)] - triangle.corner[k];
     Vec3 inward = cross(triangle.normal, edge);
     const Vec3& third = triangle.corner[next_corner(next_corner(k))];
     if (dot(inward, third - triangle.corner[k]) < 0) inward = -inward;
-    // inside: height + t * climb >= 0
     const Real height = dot(inward, segment.centre - triangle.corner[k]);
-    const Real climb = dot(inward, segment.axis);
-    if (climb == 0) {
-      if (height < 0) return false;
-      continue;
-    }
-    const Real t = -height / climb;
-    if (climb > 0) {
-      *lower = t > *lower ? t : *lower;
-    } else {
-      *upper = t < *upper ? t : *upper;
-    }
+    if (!part->clip(-height, -dot(inward, segment.axis))) return false;
   }
-  return *lower <= *upper;
+  return part->lower <= part->upper;
 }
 
 /// The closest points of an axis and a triangle: those of an end of the axis and the triangle, or
@@ -104,12 +90,12 @@ JFPX_HD inline void find_closest(const TriangleInstance& triangle, CapsuleOnTria
   const auto height = [&](Real at) {
     return dot(triangle.normal, s.point(at) - triangle.corner[0]);
   };
-  Real lower = 0, upper = 0;
+  SegmentPart part(s);
   const Real low = height(-s.half_length), high = height(s.half_length);
-  if ((low < 0) != (high < 0) && clip_to_face(s, triangle, &lower, &upper)) {
-    const Real at_lower = height(lower), at_upper = height(upper);
+  if ((low < 0) != (high < 0) && clip_to_face(s, triangle, &part)) {
+    const Real at_lower = height(part.lower), at_upper = height(part.upper);
     if ((at_lower < 0) != (at_upper < 0)) {
-      state->nearest = at_lower < at_upper ? lower : upper;
+      state->nearest = at_lower < at_upper ? part.lower : part.upper;
       state->distance = at_lower < at_upper ? at_lower : at_upper;
       state->normal = triangle.normal;
       state->feature = kFace;
@@ -127,7 +113,6 @@ JFPX_HD inline void find_closest(const TriangleInstance& triangle, CapsuleOnTria
 /// Otherwise, the closest points.
 JFPX_HD inline void find_contact(const Posed<Capsule>& a, const TriangleInstance& b,
                                  const PairMotion& pair, PairManifold* manifold) {
-  constexpr Real kParallelCosine = Real(0.998);
   const Real radius = a.shape.radius;
   CapsuleOnTriangle state;
   Real t = 0;
@@ -143,17 +128,11 @@ JFPX_HD inline void find_contact(const Posed<Capsule>& a, const TriangleInstance
     add_point(a, segment.point(at) + a.pose.origin, shift, distance - radius, feature, pair,
               manifold);
   };
-  Real lower = 0, upper = 0;
-  if (dot(state.normal, b.normal) > kParallelCosine && clip_to_face(segment, b, &lower, &upper)) {
+  SegmentPart part(segment);
+  if (dot(state.normal, b.normal) > kRestingCosine && clip_to_face(segment, b, &part)) {
+    manifold->normal = b.normal;
     const auto height = [&](Real at) { return dot(b.normal, segment.point(at) - b.corner[0]); };
-    const Real low = height(lower), high = height(upper);
-    // Exception: an end beside the face is deeper.
-    if ((low < high ? low : high) <= state.distance + kNearlyDeepest * radius) {
-      const Real highest = pair.margin + radius;
-      manifold->normal = b.normal;
-      if (low <= highest) add(lower, low, kLowerPoint);
-      if (high <= highest && upper > lower) add(upper, high, kUpperPoint);
-    }
+    add_ends(part, state.distance, radius, pair, height, add);
   }
   if (manifold->point_count > 0 || !b.is_proximal(state.feature, state.normal)) return;
   manifold->normal = state.normal;
@@ -173,7 +152,9 @@ JFPX_HD inline void find_contact(const Posed<Box>& a, const TriangleInstance& b,
     return {axes * widest.normal, widest.distance};
   };
   if (!advance(pair, separation_at, &t)) return;
-  Manifold points = triangle_manifold(boxed, b, axes, widest, pair.margin);
+  LeastOverlap axis;
+  if (!find_contact_axis(boxed, b, axes, widest, &axis)) return;
+  Manifold points = triangle_manifold(boxed, axis, pair.margin);
   if (points.count == 0) return;
   manifold->normal = axes * points.normal;
   const Vec3 shift = pair.motion * t;
