@@ -69,9 +69,9 @@ class ForceBuffers {
     view_.on_body = transfer.put(&on_body_, from.on_body, from.on_body_count);
     view_.first_item = transfer.put(&first_item_, from.first_item, from.first_item_count);
     view_.mass = transfer.put(&mass_, from.mass, from.mass_count);
-    parts_on_device_.assign(from.parts, from.parts + from.part_count);
-    for (SolidPart& part : parts_on_device_) hulls->move_to_device(transfer, &part.solid);
-    view_.parts = transfer.put(&parts_, parts_on_device_);
+    view_.parts = transfer.put(
+        &parts_, hulls->on_device(transfer, from.parts, from.part_count, &parts_on_device_),
+        from.part_count);
     view_.first_part = transfer.put(&first_part_, from.first_part, from.first_part_count);
   }
 

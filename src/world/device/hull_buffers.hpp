@@ -4,6 +4,7 @@
 #include "src/collide/shapes.hpp"
 #include "src/world/device/transfer.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -21,8 +22,21 @@ class HullBuffers {
   /// Removes all hulls. Every list of solids must be copied again.
   void clear() { copies_.clear(); }
 
-  /// Replaces the pointer to a hull in host memory by one to its copy on the device. Waits if the
-  /// hull is new.
+  /// The items, with pointers to hulls on the device in their members `solid`. Waits for new hulls.
+  /// @param room receives a copy of the items if one of them is a hull
+  template <class Item>
+  const Item* on_device(const Transfer<Device>& transfer, const Item* items, std::size_t count,
+                        std::vector<Item>* room) {
+    const auto is_hull = [](const Item& item) { return item.solid.hull != nullptr; };
+    if (std::none_of(items, items + count, is_hull)) return items;
+    room->assign(items, items + count);
+    for (Item& item : *room) move_to_device(transfer, &item.solid);
+    return room->data();
+  }
+
+ private:
+  using Words = typename Device::template Buffer<std::uint64_t>;
+
   void move_to_device(const Transfer<Device>& transfer, detail::Solid* solid) {
     if (solid->hull == nullptr) return;
     const detail::HullView& hull = *solid->hull;
@@ -34,9 +48,6 @@ class HullBuffers {
     }
     solid->hull = reinterpret_cast<const detail::HullView*>(found->second.data());
   }
-
- private:
-  using Words = typename Device::template Buffer<std::uint64_t>;
 
   /// All arrays of a hull are in one buffer, behind its view.
   static void put(const Transfer<Device>& transfer, const detail::HullView& hull, Words* copy) {

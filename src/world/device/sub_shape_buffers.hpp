@@ -29,9 +29,9 @@ class SubShapeBuffers {
     transfer.put(&bodies_, from.bodies, ranges_.all());
     transfer.put(&numbers_, from.numbers, ranges_.all());
     transfer.put(&bounds_, from.all_bounds, bounded);
-    solids_on_device_.assign(from.solids, from.solids + (bounded - ranges_.spheres()));
-    for (PosedSolid& solid : solids_on_device_) hulls->move_to_device(transfer, &solid.solid);
-    transfer.put(&solids_, solids_on_device_);
+    const std::size_t solids = bounded - ranges_.spheres();
+    transfer.put(&solids_, hulls->on_device(transfer, from.solids, solids, &solids_on_device_),
+                 solids);
     transfer.put(&walls_, from.walls, ranges_.all() - bounded);
     transfer.put(&parts_, from.parts, bounded);
     transfer.put(&local_, from.local, part_count, part_room_);
