@@ -1,8 +1,8 @@
 /// Tests of worlds with hulls: mass, rest, seams, buoyancy and files.
 #include "src/scene/compound.hpp"
 #include "src/scene/scene_json.hpp"
+#include "tests/world/meshes.hpp"
 #include "tests/world/random_bodies.hpp"
-#include "tests/world/support.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -125,26 +125,11 @@ TEST(HullWorld, HullsComeToRestInAHeap) {
 
 /// As MeshWorld.NothingIsStoppedBySeamsOfAFlatMesh, for a prism with twelve sides.
 TEST(HullWorld, AHullSlidesOverTheSeamsOfAFlatMesh) {
-  constexpr std::uint32_t kCells = 60;
-  TriangleMeshDef floor;
-  for (std::uint32_t i = 0; i <= kCells; ++i) {
-    for (std::uint32_t k = 0; k <= kCells; ++k) {
-      floor.vertices.push_back({static_cast<Real>(k) - 30, 0, static_cast<Real>(i) - 30});
-    }
-  }
-  for (std::uint32_t i = 0; i < kCells; ++i) {
-    for (std::uint32_t k = 0; k < kCells; ++k) {
-      const std::uint32_t a = i * (kCells + 1) + k, c = a + kCells + 1;
-      floor.triangles.push_back({a, c, a + 1});
-      floor.triangles.push_back({a + 1, c, c + 1});
-    }
-  }
+  const TriangleMesh floor = test::flat_grid(60, 1);
   for (const Real speed : {0.3_r, 5.0_r, 20.0_r}) {
     Scene scene;
     scene.sleep.enabled = false;
-    scene.bodies.push_back(body_with(TriangleMesh(floor), {}));
-    scene.bodies[0].mass = 0;
-    scene.bodies[0].friction = 0;
+    scene.bodies.push_back(test::fixed_mesh(floor, 0));
     BodyDef body = body_with(prism(12, 0.5_r, 0.3_r), {-15.87_r, 0.3_r, -11.8_r});
     body.friction = 0;
     body.velocity = Vec3{0.8_r, 0, 0.6_r} * speed;

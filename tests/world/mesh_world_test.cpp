@@ -1,52 +1,20 @@
 /// Tests of worlds with triangle meshes: seams, rest, rotating meshes, queries and files.
 #include "src/scene/scene_json.hpp"
-#include "tests/world/support.hpp"
+#include "tests/world/meshes.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 namespace jfpx {
 namespace {
 
+using test::fixed_mesh;
+using test::flat_grid;
+using test::grid;
 using test::operator""_r;
-
-/// A square grid around the origin. Diagonals alternate.
-TriangleMesh grid(std::uint32_t cells, Real size,
-                  const std::function<Real(std::uint32_t, std::uint32_t)>& height) {
-  TriangleMeshDef def;
-  const auto middle = static_cast<Real>(cells) / 2;
-  for (std::uint32_t z = 0; z <= cells; ++z) {
-    for (std::uint32_t x = 0; x <= cells; ++x) {
-      def.vertices.push_back({(static_cast<Real>(x) - middle) * size, height(x, z),
-                              (static_cast<Real>(z) - middle) * size});
-    }
-  }
-  for (std::uint32_t z = 0; z < cells; ++z) {
-    for (std::uint32_t x = 0; x < cells; ++x) {
-      const std::uint32_t a = z * (cells + 1) + x, b = a + 1, c = a + cells + 1, d = c + 1;
-      if ((x + z) % 2 == 0) {
-        def.triangles.insert(def.triangles.end(), {{a, c, b}, {b, c, d}});
-      } else {
-        def.triangles.insert(def.triangles.end(), {{a, c, d}, {a, d, b}});
-      }
-    }
-  }
-  return TriangleMesh(std::move(def));
-}
-TriangleMesh flat_grid(std::uint32_t cells, Real size) {
-  return grid(cells, size, [](std::uint32_t, std::uint32_t) { return 0.0_r; });
-}
-BodyDef fixed_mesh(TriangleMesh mesh, Real friction) {
-  BodyDef def;
-  def.shape = std::move(mesh);
-  def.mass = 0;
-  def.friction = friction;
-  return def;
-}
 
 /// A solid that lies on the plane y = 0, and moves in a direction of that plane.
 struct Slider {
