@@ -110,7 +110,7 @@ int main() {
 
   const jfpx::JointState taut = world.joint_state(rope);
   std::printf("the rope of %.2f m pulls with %.0f N\n", static_cast<double>(taut.length),
-              static_cast<double>(taut.force));
+              static_cast<double>(taut.tension));
 
   const auto is_solid = [&world](jfpx::BodyId id) { return !world.sensor(id); };
   const std::optional<jfpx::RayHit> hit =

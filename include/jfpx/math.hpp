@@ -132,6 +132,14 @@ JFPX_HD inline bool is_finite(const Quat& q) {
 /// @param angle from -10^6 to 10^6
 /// @throws InvalidArgument
 JFPX_API Quat from_axis_angle(const Vec3& axis, Real angle);
+/// The shortest rotation of the x axis to the direction of `axis`.
+/// @param axis finite and longer than kEpsilon, of any length
+/// @throws InvalidArgument
+JFPX_API Quat axes_along(const Vec3& axis);
+/// A rotation of the x axis to the direction of `x`, and of the y axis as near as possible to `y`.
+/// @param x, y finite, of any length, and not parallel
+/// @throws InvalidArgument
+JFPX_API Quat axes_along(const Vec3& x, const Vec3& y);
 
 /// A 3x3 matrix, stored in row-major order. The default is the identity.
 struct Mat3 {

@@ -13,7 +13,8 @@ from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Er
                       InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
                       ForceContext, Gravity, Spring, States)
-from ._joints import DistanceJoint, JointId, JointState
+from ._joints import (BallJoint, DistanceJoint, FixedJoint, HingeJoint, JointId, JointState,
+                      SliderJoint, WheelJoint)
 from ._recording import Recording, RecordingWriter
 from ._scene import Scene, scene_names
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
@@ -22,12 +23,13 @@ from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepRepor
 __version__ = "0.2.0"
 
 __all__ = [
-    "Attachment", "available_backends", "BackendUnavailable", "BEGIN", "BodyId", "BodyState",
-    "Bungee", "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactRows", "Contacts",
+    "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyId", "BodyState", "Bungee",
+    "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactRows", "Contacts",
     "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError",
-    "find_contacts", "find_pairs", "ForceContext", "Gravity", "InvalidArgument", "InvalidScene",
+    "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "InvalidArgument", "InvalidScene",
     "InvalidSnapshot", "JointId", "JointState", "OutOfMemory", "PeriodicContactRows",
     "PeriodicContacts", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
-    "RecordingWriter", "Rows", "Scene", "scene_names", "SphereCollider", "Spring", "States",
-    "STAY", "StepReport", "World", "WorldContacts",
+    "RecordingWriter", "Rows", "STAY", "Scene", "SliderJoint", "SphereCollider", "Spring",
+    "States", "StepReport", "WheelJoint", "World", "WorldContacts", "available_backends",
+    "find_contacts", "find_pairs", "scene_names",
 ]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import pi
 from typing import Any, NamedTuple
 
 from . import _arrays
@@ -36,14 +37,28 @@ class JointState(NamedTuple):
         That of body b.
     length : float
         Their distance [m].
-    force : float
-        [N], along the line of the anchors, mean of the last substep; > 0 pulls the bodies together.
+    tension : float
+        [N], of a DistanceJoint: along the line of the anchors; > 0 pulls the bodies together.
+    force : three numbers
+        [N], in the world, on body a at its anchor, mean of the last substep.
+    torque : three numbers
+        [N m], in the world, on body a in addition to that of the force.
+    position : float
+        [m] or [rad], of a relative to b: the length of a DistanceJoint, the angle of a HingeJoint in
+        [-pi, pi], the position of a SliderJoint or a WheelJoint, the angle between the x axes of a
+        BallJoint.
+    speed : float
+        [m/s] or [rad/s], rate of the position; of a WheelJoint that of its rotation.
     """
 
     point_a: tuple[float, ...]
     point_b: tuple[float, ...]
     length: float
-    force: float
+    tension: float
+    force: tuple[float, ...]
+    torque: tuple[float, ...]
+    position: float
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -86,12 +101,198 @@ class DistanceJoint:
                 _arrays.count(self.user_data, "user_data", 0, 2**64 - 1))
 
     @classmethod
-    def _of(cls, fields: tuple[Any, ...]) -> DistanceJoint:
-        a, b, *others = fields
+    def _of(cls, values: tuple[Any, ...]) -> DistanceJoint:
+        a, b, *others = values
         return cls(BodyId(*a), None if b is None else BodyId(*b), *others)
 
 
-_TYPES = {joint._name: joint for joint in (DistanceJoint,)}
+Rotation = tuple[float, float, float, float]
+_IDENTITY: Rotation = (1.0, 0.0, 0.0, 0.0)
+
+
+class _FrameJoint:
+    """What joints with axes have in common: the order of their fields is that of the engine."""
+
+    def _values(self) -> tuple[Any, ...]:
+        values: list[Any] = []
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if field.name == "a":
+                values.append(_arrays.body(value, "a"))
+            elif field.name == "b":
+                values.append(_optional(value))
+            elif field.name.startswith("anchor_"):
+                values.append(_arrays.triple(value, field.name))
+            elif field.name.startswith("axes_"):
+                values.append(_arrays.triple(value, field.name, 4))
+            elif field.name == "collide_connected":
+                values.append(bool(value))
+            elif field.name == "user_data":
+                values.append(_arrays.count(value, field.name, 0, 2**64 - 1))
+            else:
+                values.extend(_numbers(self, field.name))
+        return tuple(values)
+
+    @classmethod
+    def _of(cls, values: tuple[Any, ...]) -> Any:
+        a, b, *others = values
+        return cls(BodyId(*a), None if b is None else BodyId(*b), *others)  # type: ignore[call-arg]
+
+
+@dataclass(frozen=True)
+class BallJoint(_FrameJoint):
+    """Holds two points of two bodies together: three rotations stay free.
+
+    a, b, anchor_a, anchor_b, collide_connected, user_data : as in DistanceJoint
+    axes_a, axes_b : unit quaternions (w, x, y, z), from joint axes to the axes of the bodies; the
+    angles are 0 when the joint axes coincide, and x is the twist axis
+    cone_angle : [rad] from 0 to pi, largest angle between the x axes; pi: free
+    min_twist, max_twist : [rad] from -pi to pi, of a about x; both: free,
+    otherwise pi is a limit, too
+    hertz : [Hz] from 0 to 1e6, of a spring to all angles 0; 0: none
+    damping_ratio : from 0 to 1000, of the spring
+    friction_torque : [N m] from 0 to 1e9, largest torque against rotation
+    """
+
+    a: BodyId
+    b: BodyId | None = None
+    anchor_a: Vector = (0.0, 0.0, 0.0)
+    anchor_b: Vector = (0.0, 0.0, 0.0)
+    axes_a: Rotation = _IDENTITY
+    axes_b: Rotation = _IDENTITY
+    cone_angle: float = pi
+    min_twist: float = -pi
+    max_twist: float = pi
+    hertz: float = 0.0
+    damping_ratio: float = 0.0
+    friction_torque: float = 0.0
+    collide_connected: bool = False
+    user_data: int = 0
+
+    _name = "ball"
+
+
+@dataclass(frozen=True)
+class HingeJoint(_FrameJoint):
+    """Lets body a rotate relative to b about the x axis of the joint only.
+
+    min_angle, max_angle : [rad] from -pi to pi, of a about x; both: free,
+    otherwise pi is a limit, too
+    target_angle : [rad] from -pi to pi, of the spring
+    hertz, damping_ratio : of the spring, as in BallJoint
+    motor_speed : [rad/s], of a about x
+    max_motor_torque : [N m] from 0 to 1e9; 0: no motor; with speed 0: a brake
+    The other fields are those of BallJoint.
+    """
+
+    a: BodyId
+    b: BodyId | None = None
+    anchor_a: Vector = (0.0, 0.0, 0.0)
+    anchor_b: Vector = (0.0, 0.0, 0.0)
+    axes_a: Rotation = _IDENTITY
+    axes_b: Rotation = _IDENTITY
+    min_angle: float = -pi
+    max_angle: float = pi
+    target_angle: float = 0.0
+    hertz: float = 0.0
+    damping_ratio: float = 0.0
+    motor_speed: float = 0.0
+    max_motor_torque: float = 0.0
+    collide_connected: bool = False
+    user_data: int = 0
+
+    _name = "hinge"
+
+
+@dataclass(frozen=True)
+class SliderJoint(_FrameJoint):
+    """Lets body a move relative to b along the x axis of the joint only, without rotation.
+
+    min_position, max_position : [m] from -1e9 to 1e9, of a's anchor along x
+    target_position : [m], of the spring
+    hertz, damping_ratio : of the spring, as in BallJoint
+    motor_speed : [m/s], of a along x
+    max_motor_force : [N] from 0 to 1e9; 0: no motor; with speed 0: a brake
+    The other fields are those of BallJoint.
+    """
+
+    a: BodyId
+    b: BodyId | None = None
+    anchor_a: Vector = (0.0, 0.0, 0.0)
+    anchor_b: Vector = (0.0, 0.0, 0.0)
+    axes_a: Rotation = _IDENTITY
+    axes_b: Rotation = _IDENTITY
+    min_position: float = -1e9
+    max_position: float = 1e9
+    target_position: float = 0.0
+    hertz: float = 0.0
+    damping_ratio: float = 0.0
+    motor_speed: float = 0.0
+    max_motor_force: float = 0.0
+    collide_connected: bool = False
+    user_data: int = 0
+
+    _name = "slider"
+
+
+@dataclass(frozen=True)
+class FixedJoint(_FrameJoint):
+    """Keeps two bodies in the relative pose in which their joint frames coincide.
+
+    linear_hertz, angular_hertz : [Hz] from 0 to 1e6, of springs that hold points and axes; 0: rigid
+    damping_ratio : from 0 to 1000, of the springs
+    The other fields are those of BallJoint.
+    """
+
+    a: BodyId
+    b: BodyId | None = None
+    anchor_a: Vector = (0.0, 0.0, 0.0)
+    anchor_b: Vector = (0.0, 0.0, 0.0)
+    axes_a: Rotation = _IDENTITY
+    axes_b: Rotation = _IDENTITY
+    linear_hertz: float = 0.0
+    angular_hertz: float = 0.0
+    damping_ratio: float = 0.0
+    collide_connected: bool = False
+    user_data: int = 0
+
+    _name = "fixed"
+
+
+@dataclass(frozen=True)
+class WheelJoint(_FrameJoint):
+    """A wheel a on a vehicle b: rotates about the x axis of the joint, and moves along its y axis,
+    the direction of the suspension.
+
+    min_position, max_position : [m] from -1e9 to 1e9, of the wheel along y
+    hertz, damping_ratio : of the suspension to position 0, as in BallJoint
+    steering_angle : [rad] from -pi to pi, about y
+    motor_speed : [rad/s], of the wheel about x
+    max_motor_torque : [N m] from 0 to 1e9; 0: no motor; with speed 0: a brake
+    The other fields are those of BallJoint.
+    """
+
+    a: BodyId
+    b: BodyId | None = None
+    anchor_a: Vector = (0.0, 0.0, 0.0)
+    anchor_b: Vector = (0.0, 0.0, 0.0)
+    axes_a: Rotation = _IDENTITY
+    axes_b: Rotation = _IDENTITY
+    min_position: float = -1e9
+    max_position: float = 1e9
+    hertz: float = 0.0
+    damping_ratio: float = 0.0
+    steering_angle: float = 0.0
+    motor_speed: float = 0.0
+    max_motor_torque: float = 0.0
+    collide_connected: bool = False
+    user_data: int = 0
+
+    _name = "wheel"
+
+
+_TYPES = {joint._name: joint for joint in (DistanceJoint, BallJoint, HingeJoint, SliderJoint,
+                                           FixedJoint, WheelJoint)}
 
 
 def arguments(joint: Any) -> tuple[str, tuple[Any, ...]]:

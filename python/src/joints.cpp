@@ -21,6 +21,10 @@ void from_python(nb::handle value, std::optional<BodyId>* out) {
   if (!value.is_none()) from_python(value, &out->emplace());
 }
 void from_python(nb::handle value, Vec3* out) { *out = to_vec3(nb::cast<Triple>(value)); }
+void from_python(nb::handle value, Quat* out) {
+  const auto [w, x, y, z] = nb::cast<std::tuple<double, double, double, double>>(value);
+  *out = {static_cast<Real>(w), static_cast<Real>(x), static_cast<Real>(y), static_cast<Real>(z)};
+}
 void from_python(nb::handle value, Real* out) { *out = static_cast<Real>(nb::cast<double>(value)); }
 void from_python(nb::handle value, bool* out) { *out = nb::cast<bool>(value); }
 void from_python(nb::handle value, std::uint64_t* out) { *out = nb::cast<std::uint64_t>(value); }
@@ -28,6 +32,7 @@ void from_python(nb::handle value, std::uint64_t* out) { *out = nb::cast<std::ui
 nb::object to_object(const BodyId& id) { return nb::cast(python::to_tuple(id)); }
 nb::object to_object(const std::optional<BodyId>& id) { return id ? to_object(*id) : nb::none(); }
 nb::object to_object(const Vec3& v) { return to_triple(v); }
+nb::object to_object(const Quat& q) { return nb::make_tuple(q.w, q.x, q.y, q.z); }
 template <class T>
 requires std::is_arithmetic_v<T> nb::object to_object(T value) { return nb::cast(value); }
 
@@ -85,7 +90,8 @@ void bind_joints(nb::class_<PythonWorld>& world) {
       .def("joint_state", [](const PythonWorld& self, IdTuple id) {
         const JointState state = self.get().joint_state(to_joint_id(id));
         return nb::make_tuple(to_triple(state.point_a), to_triple(state.point_b), state.length,
-                              state.force);
+                              state.tension, to_triple(state.force), to_triple(state.torque),
+                              state.position, state.speed);
       });
 }
 

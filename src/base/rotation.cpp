@@ -72,5 +72,34 @@ Quat from_axis_angle(const Vec3& axis, Real angle) {
           static_cast<Real>(static_cast<double>(axis.z) * scale)};
 }
 
+Quat axes_along(const Vec3& axis) {
+  const auto x = static_cast<double>(axis.x), y = static_cast<double>(axis.y),
+             z = static_cast<double>(axis.z);
+  const double size = std::sqrt(x * x + y * y + z * z);
+  if (!(size > static_cast<double>(kEpsilon)) || !std::isfinite(size)) {
+    throw InvalidArgument("axis is (" + text(axis.x) + ", " + text(axis.y) + ", " + text(axis.z) +
+                          "); it must be finite and longer than " + text(kEpsilon));
+  }
+  // 1 + x, without the cancellation near the opposite direction.
+  const double across2 = y * y + z * z;
+  const double w = x > 0 ? size + x : across2 / (size - x);
+  const double length = std::sqrt(w * w + across2);
+  if (!(length > 0)) return {0, 0, 1, 0};  // half a turn about y
+  return {static_cast<Real>(w / length), 0, static_cast<Real>(-z / length),
+          static_cast<Real>(y / length)};
+}
+
+Quat axes_along(const Vec3& x, const Vec3& y) {
+  const Quat along = axes_along(x);
+  const Vec3 turned = rotate(conjugate(along), y);
+  const Real size = square_root(turned.y * turned.y + turned.z * turned.z);
+  if (!(size > kEpsilon) || !is_finite(size)) {
+    throw InvalidArgument("y is (" + text(y.x) + ", " + text(y.y) + ", " + text(y.z) +
+                          "); it must be finite and not parallel to x");
+  }
+  const Quat turn{size + turned.y, turned.z, 0, 0};
+  return along * (length_squared(turn) > kEpsilon * size ? normalized(turn) : Quat{0, 1, 0, 0});
+}
+
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -170,6 +170,16 @@ template <class T>
 inline constexpr const char* kTypeName = kShapeName<T>;
 template <>
 inline constexpr const char* kTypeName<DistanceJoint> = kJointName<DistanceJoint>;
+template <>
+inline constexpr const char* kTypeName<BallJoint> = kJointName<BallJoint>;
+template <>
+inline constexpr const char* kTypeName<HingeJoint> = kJointName<HingeJoint>;
+template <>
+inline constexpr const char* kTypeName<SliderJoint> = kJointName<SliderJoint>;
+template <>
+inline constexpr const char* kTypeName<FixedJoint> = kJointName<FixedJoint>;
+template <>
+inline constexpr const char* kTypeName<WheelJoint> = kJointName<WheelJoint>;
 
 /// True if `type` is the name of shape or joint T. Version 0.1 named a compound "assembly".
 template <class T>

@@ -115,10 +115,25 @@ std::string find_pair_fault(std::span<const BodyPair> ignored_pairs, std::uint64
   return {};
 }
 
+std::string find_order_fault(const char* min_name, Real min, const char* max_name, Real max) {
+  if (min <= max) return {};
+  return fault(min_name, min, std::string("at most ") + max_name + ", which is " + to_text(max));
+}
 std::string find_coupled_fault(const DistanceJoint& joint) {
-  if (joint.min_length <= joint.max_length) return {};
-  return fault("min_length", joint.min_length,
-               "at most max_length, which is " + to_text(joint.max_length));
+  return find_order_fault("min_length", joint.min_length, "max_length", joint.max_length);
+}
+std::string find_coupled_fault(const BallJoint& joint) {
+  return find_order_fault("min_twist", joint.min_twist, "max_twist", joint.max_twist);
+}
+std::string find_coupled_fault(const HingeJoint& joint) {
+  return find_order_fault("min_angle", joint.min_angle, "max_angle", joint.max_angle);
+}
+std::string find_coupled_fault(const SliderJoint& joint) {
+  return find_order_fault("min_position", joint.min_position, "max_position", joint.max_position);
+}
+std::string find_coupled_fault(const FixedJoint&) { return {}; }
+std::string find_coupled_fault(const WheelJoint& joint) {
+  return find_order_fault("min_position", joint.min_position, "max_position", joint.max_position);
 }
 
 /// The first fault of the joints of a scene.

@@ -16,6 +16,7 @@ Scene make_mixed(const Counts& counts);
 Scene make_capsules(const Counts& counts);
 Scene make_terrain(const Counts& counts);
 Scene make_bridge(const Counts& counts);
+Scene make_ragdolls(const Counts& counts);
 Scene make_pile(const Counts& counts);
 Scene make_heap(const Counts& counts);
 Scene make_dam_break(const Counts& counts);

@@ -26,6 +26,8 @@ constexpr Entry kScenes[] = {
      Boxes::none, make_terrain},
     {"bridge", "balls fall on a bridge of planks that ropes hold, with crates on ropes below", 36,
      Boxes::none, make_bridge},
+    {"ragdolls", "figures of eleven bodies with ball joints and hinges; --spheres is their number",
+     20, Boxes::none, make_ragdolls},
     {"pile", "a jittered lattice of spheres falls into an open box and comes to rest", 2048,
      Boxes::none, make_pile},
     {"heap", "spheres of radius 0.45 to 0.5 m fall into an open box, come to rest and sleep", 4096,

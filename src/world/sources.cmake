@@ -17,6 +17,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/forces/force_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces/forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces/step_view.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/joints/joint_state.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joints/joint_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/query_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_calls.cpp

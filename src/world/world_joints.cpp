@@ -2,6 +2,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/scene/scene_validate.hpp"
+#include "src/world/joints/joint_state.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <string>
@@ -149,21 +150,14 @@ JointState World::joint_state(JointId id) const {
   const std::uint32_t slot = impl_->joints.require(id);
   const BodyStore& bodies = impl_->bodies_with_states();
   impl_->fetch_joints();
-  const auto point = [&](std::uint32_t body, const Vec3& anchor) {
-    return body == soft_step::kWorld ? anchor : to_world_point(bodies.state(body), anchor);
+  const auto state_of = [&](std::uint32_t body) {
+    return body == soft_step::kWorld ? BodyState{} : bodies.state(body);
   };
-  const Real h = impl_->scene.dt / static_cast<Real>(impl_->scene.soft_step.substeps);
-  const JoinedBodies joined = joined_bodies(impl_->joints.joint(slot));
-  return std::visit(
-      [&](const auto& joint) {
-        JointState state;
-        state.point_a = point(joined.a, joint.anchor_a);
-        state.point_b = point(joined.b, joint.anchor_b);
-        state.length = length(state.point_a - state.point_b);
-        state.force = pull_of(joint, impl_->joints.kept(slot)) / h;
-        return state;
-      },
-      impl_->joints.joint(slot));
+  const JointStore& joints = impl_->joints;
+  const JoinedBodies joined = joined_bodies(joints.joint(slot));
+  return jfpx::joint_state(joints.joint(slot), joints.input(slot), joints.kept(slot),
+                           state_of(joined.a), state_of(joined.b),
+                           impl_->scene.dt / static_cast<Real>(impl_->scene.soft_step.substeps));
 }
 
 }  // namespace JFPX_ABI

@@ -29,6 +29,7 @@ void World::Impl::write(BinaryWriter* writer) {
 }
 
 SnapshotParts World::Impl::snapshot_parts() const {
+  if (joints.any_frames()) return SnapshotParts::frames;
   if (any_recyclable(soft_step.last_contacts())) return SnapshotParts::recyclable;
   if (store.has_blocks() || store.has_places()) return SnapshotParts::joints_and_places;
   return joints.capacity() > 0 ? SnapshotParts::joints : SnapshotParts::none;

@@ -211,14 +211,14 @@ void change_generators(Bytes& bytes, Twins& twins) {
 void change_joints(Bytes& bytes, Twins& twins) {
   const auto joints = twins.world().joints();
   const JointId id = joints.empty() ? JointId{7} : joints[bytes.below(joints.size())];
-  const DistanceJoint joint = draw_joint(bytes, twins.world().bodies());
+  const Joint joint = draw_joint(bytes, twins.world().bodies());
   switch (bytes.below(4)) {
     case 0:
       twins.both([&](World& w) { w.remove_joint(id); });
       break;
     case 1: {
       const auto set = twins.both([&](World& w) { w.set_joint(id, joint); });
-      require(!set || twins.world().joint(id) == Joint(joint), "a joint is what was set");
+      require(!set || twins.world().joint(id) == joint, "a joint is what was set");
       break;
     }
     default:

@@ -210,7 +210,91 @@ GeneratedContact draw_contact(Bytes& bytes, std::span<const BodyId> bodies) {
   return contact;
 }
 
-DistanceJoint draw_joint(Bytes& bytes, std::span<const BodyId> bodies) {
+namespace {
+
+template <class J>
+J draw_frames(Bytes& bytes, std::span<const BodyId> bodies) {
+  J joint;
+  joint.a = draw_id(bytes, bodies);
+  if (bytes.chance(Real(0.7))) joint.b = draw_id(bytes, bodies);
+  joint.anchor_a = bytes.vector(-1, 1);
+  joint.anchor_b = bytes.vector(-2, 2);
+  if (bytes.chance(Real(0.5))) joint.axes_a = draw_orientation(bytes);
+  if (bytes.chance(Real(0.5))) joint.axes_b = draw_orientation(bytes);
+  joint.collide_connected = bytes.chance(Real(0.3));
+  return joint;
+}
+
+HingeJoint draw_hinge(Bytes& bytes, std::span<const BodyId> bodies) {
+  auto joint = draw_frames<HingeJoint>(bytes, bodies);
+  if (bytes.chance(Real(0.5))) joint.min_angle = bytes.number(-kPi, 0);
+  if (bytes.chance(Real(0.5))) joint.max_angle = bytes.number(0, kPi);
+  if (bytes.chance(Real(0.3))) joint.hertz = bytes.number(0, 10);
+  joint.target_angle = bytes.number(-3, 3);
+  joint.motor_speed = bytes.number(-10, 10);
+  if (bytes.chance(Real(0.3))) joint.max_motor_torque = bytes.number(0, 100);
+  return joint;
+}
+
+BallJoint draw_ball_joint(Bytes& bytes, std::span<const BodyId> bodies) {
+  auto joint = draw_frames<BallJoint>(bytes, bodies);
+  if (bytes.chance(Real(0.5))) joint.cone_angle = bytes.number(0, kPi);
+  if (bytes.chance(Real(0.5))) joint.min_twist = bytes.number(-kPi, 0);
+  if (bytes.chance(Real(0.5))) joint.max_twist = bytes.number(0, kPi);
+  if (bytes.chance(Real(0.3))) joint.hertz = bytes.number(0, 10);
+  joint.damping_ratio = bytes.number(0, 2);
+  if (bytes.chance(Real(0.3))) joint.friction_torque = bytes.number(0, 10);
+  return joint;
+}
+
+SliderJoint draw_slider(Bytes& bytes, std::span<const BodyId> bodies) {
+  auto joint = draw_frames<SliderJoint>(bytes, bodies);
+  if (bytes.chance(Real(0.5))) joint.min_position = bytes.number(-2, 0);
+  if (bytes.chance(Real(0.5))) joint.max_position = bytes.number(0, 2);
+  if (bytes.chance(Real(0.3))) joint.hertz = bytes.number(0, 10);
+  joint.target_position = bytes.number(-1, 1);
+  joint.motor_speed = bytes.number(-10, 10);
+  if (bytes.chance(Real(0.3))) joint.max_motor_force = bytes.number(0, 100);
+  return joint;
+}
+
+FixedJoint draw_fixed(Bytes& bytes, std::span<const BodyId> bodies) {
+  auto joint = draw_frames<FixedJoint>(bytes, bodies);
+  if (bytes.chance(Real(0.5))) joint.linear_hertz = bytes.number(0, 10);
+  if (bytes.chance(Real(0.5))) joint.angular_hertz = bytes.number(0, 10);
+  joint.damping_ratio = bytes.number(0, 2);
+  return joint;
+}
+
+WheelJoint draw_wheel(Bytes& bytes, std::span<const BodyId> bodies) {
+  auto joint = draw_frames<WheelJoint>(bytes, bodies);
+  if (bytes.chance(Real(0.5))) joint.min_position = bytes.number(-2, 0);
+  if (bytes.chance(Real(0.5))) joint.max_position = bytes.number(0, 2);
+  if (bytes.chance(Real(0.7))) joint.hertz = bytes.number(0, 10);
+  joint.damping_ratio = bytes.number(0, 2);
+  joint.steering_angle = bytes.number(-1, 1);
+  joint.motor_speed = bytes.number(-10, 10);
+  if (bytes.chance(Real(0.3))) joint.max_motor_torque = bytes.number(0, 100);
+  return joint;
+}
+
+}  // namespace
+
+Joint draw_joint(Bytes& bytes, std::span<const BodyId> bodies) {
+  switch (bytes.below(8)) {
+    case 0:
+      return draw_hinge(bytes, bodies);
+    case 1:
+      return draw_ball_joint(bytes, bodies);
+    case 2:
+      return draw_slider(bytes, bodies);
+    case 3:
+      return draw_fixed(bytes, bodies);
+    case 4:
+      return draw_wheel(bytes, bodies);
+    default:
+      break;
+  }
   DistanceJoint joint{.a = draw_id(bytes, bodies)};
   if (bytes.chance(Real(0.7))) joint.b = draw_id(bytes, bodies);
   joint.anchor_a = bytes.vector(-1, 1);

@@ -16,7 +16,7 @@ BodyState draw_state(test::Bytes& bytes);
 WorldSettings draw_settings(test::Bytes& bytes);
 GeneratedContact draw_contact(test::Bytes& bytes, std::span<const BodyId> bodies);
 
-DistanceJoint draw_joint(test::Bytes& bytes, std::span<const BodyId> bodies);
+Joint draw_joint(test::Bytes& bytes, std::span<const BodyId> bodies);
 
 /// The id of a living body, or of a removed one, or an unknown one.
 BodyId draw_id(test::Bytes& bytes, std::span<const BodyId> bodies);

@@ -89,3 +89,37 @@ def test_errors_name_the_field_of_a_joint():
     with pytest.raises(jfpx.InvalidArgument, match="it must be a JointId"):
         world.joint(3)
     assert world.joints == []
+
+
+def test_a_hinge_turns_by_its_motor_and_stops_at_its_limit():
+    world = row_of_balls(1, dtype="float64")
+    ball = world.bodies[0]
+    half = math.sqrt(0.5)
+    hinge = jfpx.HingeJoint(ball, axes_a=(half, 0, 0, half), axes_b=(half, 0, 0, half),
+                            max_angle=1, motor_speed=2, max_motor_torque=5)
+    added = world.add_joint(hinge)
+    assert world.joint(added) == hinge
+    world.step()
+    state = world.joint_state(added)
+    assert state.speed == pytest.approx(2, rel=1e-6) and len(state.torque) == 3
+    assert world.state(ball).angular_velocity[1] == pytest.approx(2, rel=1e-6)
+    for _ in range(60):
+        world.step()
+    assert world.joint_state(added).position == pytest.approx(1, abs=0.003)
+
+
+@pytest.mark.parametrize("kind", ["BallJoint", "HingeJoint", "SliderJoint", "FixedJoint",
+                                  "WheelJoint"])
+def test_a_joint_with_axes_is_read_as_it_was_added(kind):
+    world = row_of_balls(2, dtype="float64")
+    a, b = world.bodies
+    joint = getattr(jfpx, kind)(a, b, anchor_b=(0, 0.5, 0), axes_a=(0, 1, 0, 0), user_data=7)
+    added = world.add_joint(joint)
+    assert world.joint(added) == joint
+    for _ in range(30):
+        world.step()
+    assert all(math.isfinite(x) for x in world.joint_state(added).force)
+    with pytest.raises(jfpx.InvalidArgument, match="axes_a"):
+        world.add_joint(getattr(jfpx, kind)(a, b, axes_a=(1, 2, 0, 0)))
+    with pytest.raises(jfpx.InvalidArgument, match="axes_b has 3 numbers; it must have 4"):
+        world.add_joint(getattr(jfpx, kind)(a, b, axes_b=(1, 0, 0)))

@@ -73,7 +73,7 @@ TEST(Joint, AFastPendulumKeepsItsEnergyAndItsLength) {
     ASSERT_NEAR(static_cast<double>(world.joint_state(world.joints()[0]).length), 1, 1e-4) << n;
   }
   // The force that keeps the ball on the circle.
-  const double force = static_cast<double>(world.joint_state(world.joints()[0]).force);
+  const double force = static_cast<double>(world.joint_state(world.joints()[0]).tension);
   EXPECT_NEAR(force / 3600, 1, 0.02);
 }
 
@@ -129,7 +129,7 @@ TEST(Joint, AHangingChainKeepsItsLength) {
   }
   EXPECT_LT(longest / static_cast<double>(kLink), 1.001);
   // The first link carries all balls.
-  EXPECT_NEAR(static_cast<double>(world.joint_state(world.joints()[0]).force) / (kLinks * kG), 1,
+  EXPECT_NEAR(static_cast<double>(world.joint_state(world.joints()[0]).tension) / (kLinks * kG), 1,
               0.01);
 }
 
@@ -142,7 +142,7 @@ TEST(Joint, ASlackRopeHasNoForceAndATautOneStopsTheBody) {
   // It falls by 1 m in 0.45 s.
   for (int n = 0; n < 25; ++n) {
     world.step();
-    ASSERT_EQ(world.joint_state(id).force, 0) << n;
+    ASSERT_EQ(world.joint_state(id).tension, 0) << n;
     const double t = (n + 1) / 60.0, fallen = kG * t * (t + 1 / 240.0) / 2;
     ASSERT_NEAR(-static_cast<double>(world.states()[0].position.y), fallen, 1e-4) << n;
   }
@@ -150,7 +150,7 @@ TEST(Joint, ASlackRopeHasNoForceAndATautOneStopsTheBody) {
     world.step();
     ASSERT_LT(world.joint_state(id).length, 1.01_r) << n;
   }
-  EXPECT_NEAR(static_cast<double>(world.joint_state(id).force), kG, 0.05);
+  EXPECT_NEAR(static_cast<double>(world.joint_state(id).tension), kG, 0.05);
   EXPECT_NEAR(static_cast<double>(length(world.states()[0].velocity)), 0, 1e-3);
 }
 

@@ -54,14 +54,15 @@ constexpr Pin kSoftStepPins[] = {
     {"mixed", 40, 150, 0x48b7fa58e62d9457u, 0x7c50a4c7f0e4e2e3u},
     {"capsules", 20, 200, 0xf850f72371f8bf3bu, 0xfd0063eb7708ddedu},
     {"terrain", 20, 200, 0xd9b57e102622d7b0u, 0x675d7a9c7a9d66acu},
-    {"bridge", 30, 200, 0x0fa9033331da8651u, 0xbab82dbf31cf057fu},
+    {"ragdolls", 9, 200, 0x94d1b5407b943e09u, 0x78cd00c27ee2de3eu},
+    {"bridge", 30, 200, 0xcce936639ae9b8e2u, 0x0d46b96de2ff43c9u},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},
 };
 
 /// joint_scene() with Solver::soft_step.
-constexpr Pin kJointPin{"joints", 100, 200, 0x4d9e3fbd38f985d5u, 0x2b0c0d5a1d7116beu};
+constexpr Pin kJointPin{"joints", 100, 200, 0x0ef23b87f7a746d0u, 0x9b9c01da67071d0fu};
 
 struct DemoPin {
   const char* demo;

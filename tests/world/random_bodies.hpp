@@ -101,9 +101,7 @@ inline BodyDef random_body(Random* random, Real room) {
   return def;
 }
 
-/// A joint of any type and with any parameters, of two given bodies.
-/// @param b absent: the world
-inline Joint random_joint(Random* random, BodyId a, std::optional<BodyId> b) {
+inline DistanceJoint random_distance_joint(Random* random, BodyId a, std::optional<BodyId> b) {
   DistanceJoint joint{.a = a, .b = b};
   const auto anchor = [&]() -> Vec3 {
     if (random->below(3) == 0) return {};
@@ -121,6 +119,80 @@ inline Joint random_joint(Random* random, BodyId a, std::optional<BodyId> b) {
   }
   joint.collide_connected = random->below(3) == 0;
   return joint;
+}
+
+/// Sets what joints with frames have in common.
+template <class J>
+J random_frames(Random* random, BodyId a, std::optional<BodyId> b) {
+  J joint;
+  joint.a = a, joint.b = b;
+  joint.anchor_a = random->uniform_in_box({-0.5_r, -0.5_r, -0.5_r}, {0.5_r, 0.5_r, 0.5_r});
+  joint.anchor_b = random->uniform_in_box({-0.5_r, -0.5_r, -0.5_r}, {0.5_r, 0.5_r, 0.5_r});
+  if (random->below(2) == 0) joint.axes_a = random_rotation(random);
+  if (random->below(2) == 0) joint.axes_b = random_rotation(random);
+  joint.collide_connected = random->below(3) == 0;
+  return joint;
+}
+
+/// A joint of any type and with any parameters, of two given bodies.
+/// @param b absent: the world
+inline Joint random_joint(Random* random, BodyId a, std::optional<BodyId> b) {
+  const auto spring = [&](Real* hertz, Real* damping_ratio) {
+    if (random->below(2) == 0) return;
+    *hertz = random->uniform(0, random->below(5) == 0 ? Real(60) : Real(5));
+    *damping_ratio = random->uniform(0, 1);
+  };
+  const auto limits = [&](Real* least, Real* most, Real size) {
+    if (random->below(2) == 0) *least = -random->uniform(0, size);
+    if (random->below(2) == 0) *most = random->uniform(0, size);
+  };
+  const auto motor = [&](Real* speed, Real* limit) {
+    if (random->below(2) == 0) return;
+    *speed = random->uniform(-5, 5);
+    *limit = random->uniform(0, 50);
+  };
+  switch (random->below(8)) {
+    case 0: {
+      auto joint = random_frames<BallJoint>(random, a, b);
+      if (random->below(2) == 0) joint.cone_angle = random->uniform(0, 3);
+      limits(&joint.min_twist, &joint.max_twist, 3);
+      spring(&joint.hertz, &joint.damping_ratio);
+      if (random->below(2) == 0) joint.friction_torque = random->uniform(0, 10);
+      return joint;
+    }
+    case 1: {
+      auto joint = random_frames<HingeJoint>(random, a, b);
+      limits(&joint.min_angle, &joint.max_angle, 3);
+      spring(&joint.hertz, &joint.damping_ratio);
+      joint.target_angle = random->uniform(-3, 3);
+      motor(&joint.motor_speed, &joint.max_motor_torque);
+      return joint;
+    }
+    case 2: {
+      auto joint = random_frames<SliderJoint>(random, a, b);
+      limits(&joint.min_position, &joint.max_position, 2);
+      spring(&joint.hertz, &joint.damping_ratio);
+      joint.target_position = random->uniform(-1, 1);
+      motor(&joint.motor_speed, &joint.max_motor_force);
+      return joint;
+    }
+    case 3: {
+      auto joint = random_frames<FixedJoint>(random, a, b);
+      spring(&joint.linear_hertz, &joint.damping_ratio);
+      spring(&joint.angular_hertz, &joint.damping_ratio);
+      return joint;
+    }
+    case 4: {
+      auto joint = random_frames<WheelJoint>(random, a, b);
+      limits(&joint.min_position, &joint.max_position, 2);
+      spring(&joint.hertz, &joint.damping_ratio);
+      joint.steering_angle = random->uniform(-1, 1);
+      motor(&joint.motor_speed, &joint.max_motor_torque);
+      return joint;
+    }
+    default:
+      return random_distance_joint(random, a, b);
+  }
 }
 
 /// Adds joints to a scene: some between random bodies, and some at one body, up to more than there
@@ -142,7 +214,7 @@ inline void add_random_joints(Random* random, Scene* scene) {
     for (int k = 0; k < 70; ++k) add(hub, random->below(bodies));
     // This many springs would throw the bodies apart.
     for (Joint& joint : std::span(scene->joints).subspan(first)) {
-      std::get<DistanceJoint>(joint).hertz = 0;
+      if (auto* distance = std::get_if<DistanceJoint>(&joint)) distance->hertz = 0;
     }
   }
 }

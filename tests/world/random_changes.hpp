@@ -7,6 +7,8 @@
 #include "tests/world/random_bodies.hpp"
 
 #include <cstdint>
+#include <tuple>
+#include <variant>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -76,8 +78,10 @@ class Change {
   void change_joints(World* world, BodyId id) const {
     const std::span<const JointId> joints = world->joints();
     Joint joint = joint_;
-    BodyId& a = std::get<DistanceJoint>(joint).a;
-    std::optional<BodyId>& b = std::get<DistanceJoint>(joint).b;
+    const auto bodies_of = [](auto& of) {
+      return std::visit([](auto& j) { return std::tie(j.a, j.b); }, of);
+    };
+    const auto [a, b] = bodies_of(joint);
     if (action_ < 14) {
       const BodyId other = world->bodies()[j_ % world->bodies().size()];
       a = id;
@@ -89,9 +93,9 @@ class Change {
     if (joints.empty()) return;
     const JointId changed = joints[i_ % joints.size()];
     if (action_ == 14) return world->remove_joint(changed);
-    const auto& before = std::get<DistanceJoint>(world->joint(changed));
-    a = before.a;
-    b = before.b;
+    const Joint& before = world->joint(changed);
+    if (joint.index() != before.index()) return;
+    std::tie(a, b) = bodies_of(before);
     world->set_joint(changed, joint);
   }
 

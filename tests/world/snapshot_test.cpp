@@ -461,7 +461,7 @@ TEST_P(Snapshots, ErrorsNameTheCause) {
   };
   EXPECT_THAT(complaint(world, {}), HasSubstr("not a snapshot of jfpx"));
   EXPECT_THAT(complaint_with(0, 'X'), HasSubstr("not a snapshot of jfpx"));
-  EXPECT_THAT(complaint_with(8, 9), HasSubstr("is of version 9; this build reads versions 1 to 4"));
+  EXPECT_THAT(complaint_with(8, 9), HasSubstr("is of version 9; this build reads versions 1 to 5"));
   EXPECT_THAT(complaint_with(12, sizeof(Real) == 4 ? 8 : 4),
               HasSubstr(sizeof(Real) == 4 ? "is float64 (double precision); it must be float32"
                                           : "is float32 (single precision); it must be float64"));

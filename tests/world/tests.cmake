@@ -34,6 +34,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/filter_test.cpp
   world/force_registry_test.cpp
   world/force_test.cpp
+  world/frame_joint_test.cpp
   world/joint_test.cpp
   world/joint_world_test.cpp
   world/kinematic_test.cpp

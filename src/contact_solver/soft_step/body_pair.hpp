@@ -13,9 +13,10 @@ struct BodyPair {
   const Mat3 *inertia_a, *inertia_b;
 };
 
-/// Orientations of the bodies of a row at the time of the sweep.
+/// Orientations of the bodies of a row at the time of the sweep, and at the start of the step.
 struct PairOrientations {
   const Quat *a = nullptr, *b = nullptr;
+  const Quat *start_a = nullptr, *start_b = nullptr;
 };
 
 /// Velocity of a's point relative to b's. A kinematic body b has a velocity.

@@ -6,7 +6,7 @@
 /// tangent, whose projection would dissipate energy (as in RATTLE: Andersen 1983).
 #pragma once
 
-#include "src/contact_solver/soft_step/body_pair.hpp"
+#include "src/contact_solver/soft_step/joint_motion.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -27,8 +27,7 @@ struct DistanceRow {
   /// limit pulls; a rod, whose limits are equal, may do both.
   Real spring_impulse = 0, lower_impulse = 0, upper_impulse = 0;
   Real spring_error = 0;  ///< [m], length of the spring minus its rest length, in this substep
-  /// Sum of this substep: impulse on a [N s], and angular impulses on a and against b [N m s].
-  Vec3 impulse, twist_a, twist_b;
+  JointSums sums;         ///< of this substep
 
   JFPX_HD bool is_rod() const { return min_length == max_length; }
   JFPX_HD Real total_impulse() const { return spring_impulse + lower_impulse - upper_impulse; }
@@ -40,18 +39,8 @@ JFPX_HD inline void store_changes(const DistanceRow& from, DistanceRow* to) {
   to->lower_impulse = from.lower_impulse;
   to->upper_impulse = from.upper_impulse;
   to->spring_error = from.spring_error;
-  to->impulse = from.impulse;
-  to->twist_a = from.twist_a;
-  to->twist_b = from.twist_b;
+  to->sums = from.sums;
 }
-
-/// Fraction of a joint error that a substep corrects. With a higher value, swinging chains gain
-/// energy.
-inline constexpr Real kJointCorrection = Real(0.2);
-
-/// Square of half the largest angle [rad] by which a joint turns in a substep on an exact circle.
-/// Larger angles are inexact, because the impulse changes the velocities too much.
-inline constexpr Real kMostTurn = Real(1) / 16;
 
 /// The anchors at the time of a sweep.
 struct DistanceAxis {
@@ -72,28 +61,17 @@ JFPX_HD inline DistanceAxis axis_of(const DistanceRow& row, const Vec3& centres,
   return axis;
 }
 
-/// Applies an impulse on a, the opposite one on b, and their angular impulses.
+/// What the impulses of a row apply along an axis.
 template <bool kFixed>
-JFPX_HD inline void apply_impulse(const BodyPair& pair, const Vec3& impulse, const Vec3& twist_a,
-                                  const Vec3& twist_b) {
-  pair.a->velocity += impulse * pair.a->inverse_mass;
-  pair.a->angular_velocity += *pair.inertia_a * twist_a;
-  if constexpr (!kFixed) {
-    pair.b->velocity -= impulse * pair.b->inverse_mass;
-    pair.b->angular_velocity -= *pair.inertia_b * twist_b;
-  }
-}
-
-/// Sets the impulses on the bodies from the impulses along an axis.
-JFPX_HD inline void set_impulse(DistanceRow* row, const DistanceAxis& axis) {
-  row->impulse = axis.direction * row->total_impulse();
-  row->twist_a = cross(axis.arm_a, row->impulse);
-  row->twist_b = cross(axis.arm_b, row->impulse);
+JFPX_HD inline JointSums sums_of(const DistanceRow& row, const BodyPair& pair,
+                                 const DistanceAxis& axis) {
+  const Vec3 impulse = axis.direction * row.total_impulse();
+  return sums_of<kFixed>(pair, impulse, cross(axis.arm_a, impulse), cross(axis.arm_b, impulse));
 }
 
 template <bool kFixed>
 JFPX_HD inline void warm_start(const DistanceRow& row, const BodyPair& pair) {
-  apply_impulse<kFixed>(pair, row.impulse, row.twist_a, row.twist_b);
+  apply<kFixed>(pair, row.sums);
 }
 
 /// Solves a DistanceRow in a sweep.
@@ -103,16 +81,17 @@ class DistanceSolver {
   JFPX_HD DistanceSolver(DistanceRow* row, const BodyPair& pair,
                          const PairOrientations& orientations, const StepConstants& step)
       : row_(row),
-        pair_(pair),
+        bodies_(pair, orientations),
+        pair_(bodies_.pair()),
         step_(step),
         axis_(axis_of(*row, row->centres + (pair.a->shift - pair.b->shift), *orientations.a,
                       *orientations.b)) {
     const Vec3& n = axis_.direction;
     const Vec3 turn_a = cross(axis_.arm_a, n);
-    Real inverse_mass = pair.a->inverse_mass + dot(turn_a, *pair.inertia_a * turn_a);
+    Real inverse_mass = pair.a->inverse_mass + dot(turn_a, *pair_.inertia_a * turn_a);
     if constexpr (!kFixed) {
       const Vec3 turn_b = cross(axis_.arm_b, n);
-      inverse_mass += pair.b->inverse_mass + dot(turn_b, *pair.inertia_b * turn_b);
+      inverse_mass += pair.b->inverse_mass + dot(turn_b, *pair_.inertia_b * turn_b);
     }
     mass_ = 1 / inverse_mass;
   }
@@ -120,10 +99,9 @@ class DistanceSolver {
   /// In the first sweep of a substep: replaces the impulse of the last substep, which was applied
   /// along the former axis, by an impulse along the current axis.
   JFPX_HD void turn_impulse() {
-    const Vec3 before = row_->impulse, twist_a = row_->twist_a, twist_b = row_->twist_b;
-    set_impulse(row_, axis_);
-    apply_impulse<kFixed>(pair_, row_->impulse - before, row_->twist_a - twist_a,
-                          row_->twist_b - twist_b);
+    const JointSums before = row_->sums;
+    row_->sums = sums_of<kFixed>(*row_, pair_, axis_);
+    apply<kFixed>(pair_, row_->sums - before);
     row_->spring_error = axis_.length - row_->rest_length;
   }
 
@@ -145,46 +123,26 @@ class DistanceSolver {
   /// @param along impulse that pushes the bodies apart
   JFPX_HD void push(Real along) {
     const Vec3 impulse = axis_.direction * along;
-    const Vec3 twist_a = cross(axis_.arm_a, impulse), twist_b = cross(axis_.arm_b, impulse);
-    apply_impulse<kFixed>(pair_, impulse, twist_a, twist_b);
-    row_->impulse += impulse;
-    row_->twist_a += twist_a;
-    row_->twist_b += twist_b;
+    const JointSums pushed =
+        sums_of<kFixed>(pair_, impulse, cross(axis_.arm_a, impulse), cross(axis_.arm_b, impulse));
+    apply<kFixed>(pair_, pushed);
+    row_->sums += pushed;
   }
 
-  /// The spring force is that of the length at the start of the substep, which preserves energy.
-  /// The damping is that of the velocity at the end, which is stable. A spring that oscillates by
-  /// more than a quarter of a radian per substep is damped further, so that it is stable even if
-  /// dozens of springs act on a body.
   JFPX_HD void solve_spring() {
-    constexpr Real kLargest = Real(1) / 16;
-    const Real angle = step_.h * row_->spring_rate, square = angle * angle;
-    const Real small = square < kLargest ? square : kLargest;
-    // (2 sin(angle / 2))^2 = square * factor: the oscillation then has the given frequency.
-    const Real factor = 1 - small * (Real(1) / 12);
-    const Real damping = step_.h * row_->damp_rate + (square - small);
-    const Real pull = mass_ * (factor * square * step_.inverse_h * row_->spring_error +
-                               damping * dot(velocity(), axis_.direction));
-    const Real change = -(pull + row_->spring_impulse) / (1 + damping);
+    const Spring spring(row_->spring_rate, row_->damp_rate, step_);
+    const Real change = spring.change(mass_, row_->spring_error, dot(velocity(), axis_.direction),
+                                      row_->spring_impulse);
     row_->spring_impulse += change;
     push(change);
-  }
-
-  /// Difference between the mean velocity of an arm that rotates with a body for a substep and
-  /// cross(w, arm), for integrated_orientation(), which rotates by the angle 2 atan(h w / 2).
-  JFPX_HD Vec3 turning(const SolverBody& body, const Vec3& arm) const {
-    const Vec3& w = body.angular_velocity;
-    const Real half = step_.h * Real(0.5), square = length_squared(w) * (half * half);
-    const Vec3 first = cross(w, arm);
-    const Real bound = square > kMostTurn ? kMostTurn / square : Real(1);
-    return (cross(w, first) * half - first * square) * (bound / (1 + square));
   }
 
   /// Second-order part of the velocity by which the length grows within the substep: the anchors
   /// move across the axis, and rotate with their bodies. @param limit the length at the end
   JFPX_HD Real bend(Real limit, const Vec3& across) const {
-    const Real arms =
-        dot(turning(*pair_.a, axis_.arm_a) - turning(*pair_.b, axis_.arm_b), axis_.direction);
+    const Real arms = dot(turning(pair_.a->angular_velocity, axis_.arm_a, step_.h) -
+                              turning(pair_.b->angular_velocity, axis_.arm_b, step_.h),
+                          axis_.direction);
     if (!(limit > 0)) return arms;
     const Real square = limit * limit, way2 = length_squared(across) * (step_.h * step_.h);
     const Real most = 4 * kMostTurn * square, bounded = way2 < most ? way2 : most;
@@ -195,13 +153,9 @@ class DistanceSolver {
   /// one relax sweep would not remove the velocity from long chains, which would gain energy.
   /// @param excess [m], by which the length exceeds the limit; negative if a rod is too short
   JFPX_HD void project(Real excess, Real sign) {
-    Real inverse_mass = pair_.a->inverse_mass;
-    if constexpr (!kFixed) inverse_mass += pair_.b->inverse_mass;
-    const Real most = step_.push_out_speed * step_.h, wanted = kJointCorrection * excess;
+    const Real most = most_correction(step_), wanted = kJointCorrection * excess;
     const Real way = wanted > most ? most : wanted < -most ? -most : wanted;
-    const Vec3 impulse = axis_.direction * (way * sign / inverse_mass);
-    pair_.a->shift -= impulse * pair_.a->inverse_mass;
-    if constexpr (!kFixed) pair_.b->shift += impulse * pair_.b->inverse_mass;
+    separate<kFixed>(pair_, axis_.direction, way * sign);
   }
 
   /// @param excess [m], by which the length exceeds the limit
@@ -228,18 +182,20 @@ class DistanceSolver {
   }
 
   DistanceRow* row_;
+  const JointBodies<kFixed> bodies_;
   const BodyPair& pair_;
   const StepConstants& step_;
   DistanceAxis axis_;
   Real mass_ = 0;  ///< [kg], effective, along the axis
 };
 
+/// @param starts whether it is the first sweep of a substep
 template <bool kFixed>
 JFPX_HD inline void solve(DistanceRow* row, const BodyPair& pair,
                           const PairOrientations& orientations, const StepConstants& step,
-                          bool use_bias) {
+                          bool use_bias, bool starts) {
   DistanceSolver<kFixed> solver(row, pair, orientations, step);
-  if (use_bias) solver.turn_impulse();
+  if (starts) solver.turn_impulse();
   solver.solve(use_bias);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/soft_step/distance_row.hpp"
+#include "src/contact_solver/soft_step/frame_row.hpp"
 #include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/contact_solver/soft_step/manifold_row.hpp"
 #include "src/contact_solver/soft_step/sphere_row.hpp"
@@ -25,8 +26,8 @@ namespace soft_step {
 ///     values are kept for the next step and in snapshots;
 ///   - run() of each operation in row_operations.hpp;
 ///   - store_changes(), except SphereRow.
-/// Rows of joints are last, in the order of the alternatives of Joint.
-using RowTypes = std::tuple<SphereRow, ManifoldRow, DistanceRow>;
+/// Rows of joints are last.
+using RowTypes = std::tuple<SphereRow, ManifoldRow, DistanceRow, FrameRow>;
 
 /// Index of a type in RowTypes.
 using RowKind = std::uint8_t;
@@ -45,7 +46,7 @@ inline constexpr RowKind kKindOf = index_in<Row>(static_cast<RowTypes*>(nullptr)
 
 /// Kind of the rows of a joint. @param type index of the alternative of Joint
 JFPX_HD constexpr RowKind kind_of_joint(std::uint32_t type) {
-  return static_cast<RowKind>(kKindOf<DistanceRow> + type);
+  return type == 0 ? kKindOf<DistanceRow> : kKindOf<FrameRow>;
 }
 
 template <class Row>

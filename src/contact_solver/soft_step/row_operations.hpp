@@ -40,6 +40,10 @@ struct WarmStart {
   JFPX_HD void run(DistanceRow* row, const RowContext<NoPart, Impacts>& c) const {
     warm_start<kFixed>(*row, c.bodies);
   }
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(FrameRow* row, const RowContext<NoPart, Impacts>& c) const {
+    warm_start<kFixed>(*row, c.bodies);
+  }
 };
 
 /// @tparam kUseBias whether it is a bias sweep, which pushes penetrations out, or a relax sweep
@@ -47,6 +51,7 @@ template <bool kUseBias>
 struct Solve {
   static constexpr bool kChangesRow = true, kMovesBodies = true;
   const StepConstants& constants;
+  bool starts = false;  ///< whether the sweep is the first one of a substep
   template <bool kFixed, class Impacts>
   JFPX_HD void run(SphereRow* row, const RowContext<NoPart, Impacts>& c) const {
     solve<kFixed>(row, c.bodies.a, c.bodies.b, constants, *c.impacts, kUseBias);
@@ -57,8 +62,21 @@ struct Solve {
   }
   template <bool kFixed, class Impacts>
   JFPX_HD void run(DistanceRow* row, const RowContext<NoPart, Impacts>& c) const {
-    solve<kFixed>(row, c.bodies, c.orientations, constants, kUseBias);
+    solve<kFixed>(row, c.bodies, c.orientations, constants, kUseBias, starts);
   }
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(FrameRow* row, const RowContext<NoPart, Impacts>& c) const {
+    solve<kFixed>(row, c.bodies, c.orientations, constants, kUseBias, starts);
+  }
+};
+
+/// A bias sweep over the rows of joints only.
+struct SolveJoints : Solve<true> {
+  using Solve<true>::run;
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(SphereRow*, const RowContext<NoPart, Impacts>&) const {}
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(ManifoldRow*, const RowContext<PointRow, Impacts>&) const {}
 };
 
 /// Restitution of manifolds. Spheres have rebounded in the substeps; joints do not rebound.
@@ -72,6 +90,8 @@ struct Restitute {
   }
   template <bool kFixed, class Impacts>
   JFPX_HD void run(DistanceRow*, const RowContext<NoPart, Impacts>&) const {}
+  template <bool kFixed, class Impacts>
+  JFPX_HD void run(FrameRow*, const RowContext<NoPart, Impacts>&) const {}
 };
 
 /// Concept of the types in RowTypes, which documents the requirements.

@@ -32,8 +32,9 @@ struct BodyProperties {
   const Real *friction = nullptr, *restitution = nullptr;
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
   MaterialSettings rules;
-  const Vec3* position = nullptr;     ///< [m]
-  const Quat* orientation = nullptr;  ///< on the CPU, at the time of the sweep
+  const Vec3* position = nullptr;           ///< [m]
+  const Quat* orientation = nullptr;        ///< on the CPU, at the time of the sweep
+  const Quat* start_orientation = nullptr;  ///< at the start of the step
 };
 
 /// Builds rows of contacts and joints. Body a of a row is movable. Contacts and joints are numbered
@@ -237,7 +238,39 @@ struct RowSetup {
     const Real* kept = joints.now[joint_of(i)].impulses;
     row->spring_impulse = kept[0], row->lower_impulse = kept[1], row->upper_impulse = kept[2];
     row->spring_error = 0;
-    set_impulse(row, axis_of(*row, row->centres, properties.orientation[row->a], orientation_b));
+    row->sums =
+        sums_of<kFixed>(*row, joint_pair<kFixed>(*row),
+                        axis_of(*row, row->centres, properties.orientation[row->a], orientation_b));
+  }
+
+  template <bool kFixed>
+  JFPX_HD void fill(FrameRow* row, NoPart*, std::uint32_t i) const {
+    const JointInput& joint = joints.inputs[joint_of(i)];
+    const FrameInput& input = joint.frames;
+    const bool flipped = is_flipped(key(i));
+    row->a = flipped ? joint.b : joint.a;
+    row->b = flipped ? joint.a : joint.b;
+    row->is_flipped = flipped ? 1 : 0;
+    row->parameters = input.parameters;
+    row->anchor_a = flipped ? input.anchor_b : input.anchor_a;
+    row->anchor_b = flipped ? input.anchor_a : input.anchor_b;
+    row->axes_a = flipped ? input.axes_b : input.axes_a;
+    row->axes_b = flipped ? input.axes_a : input.axes_b;
+    Vec3 centre_b = row->anchor_b;
+    Quat orientation_b;
+    if (row->b == kWorld) {
+      row->anchor_b = {};
+    } else {
+      centre_b = properties.position[row->b];
+      orientation_b = properties.orientation[row->b];
+    }
+    row->centres = properties.position[row->a] - centre_b;
+    row->impulses = frame_impulses(joints.now[joint_of(i)]);
+    row->linear_error = row->angular_error = {};
+    row->turned_a = row->turned_b = {};
+    row->sums = sums_of<kFixed>(
+        *row, joint_pair<kFixed>(*row),
+        FramePose::of(*row, row->centres, properties.orientation[row->a], orientation_b));
   }
 
   /// Writes the impulses of a row to its contact or joint.
@@ -279,8 +312,17 @@ struct RowSetup {
     Real* kept = joints.now[joint_of(i)].impulses;
     kept[0] = row.spring_impulse, kept[1] = row.lower_impulse, kept[2] = row.upper_impulse;
   }
+  JFPX_HD void store(const FrameRow& row, const NoPart*, std::uint32_t i) const {
+    keep_impulses(row.impulses, &joints.now[joint_of(i)]);
+  }
 
  private:
+  /// The inertias of the bodies of a joint at the start of the step.
+  template <bool kFixed>
+  JFPX_HD BodyPair joint_pair(const auto& row) const {
+    return {nullptr, nullptr, &properties.inverse_inertia[row.a],
+            kFixed ? nullptr : &properties.inverse_inertia[row.b]};
+  }
   struct PointArms {
     Vec3 a, b;  ///< [m], from the centres of mass of the bodies of the row
   };

@@ -10,6 +10,18 @@ namespace soft_step {
 /// Sweeps over the rows per substep: one bias sweep, and relax sweeps without bias.
 inline constexpr std::uint32_t kRelaxSweeps = 1, kSweepsPerSubstep = 1 + kRelaxSweeps;
 
+/// Bias sweeps over the rows of joints only, before the bias sweep of a substep over all rows. The
+/// impulses of joints change in each substep, and with a single iteration, their errors would add
+/// energy to chains.
+inline constexpr std::uint32_t kJointSweeps = 3;
+/// Largest number of sweeps in the substeps of a step. Many substeps have fewer joint sweeps.
+inline constexpr std::uint32_t kMostSweeps = 244;
+JFPX_HD constexpr std::uint32_t joint_sweeps(std::uint32_t substeps) {
+  const std::uint32_t most = kMostSweeps / substeps - kSweepsPerSubstep;
+  return most < kJointSweeps ? most : kJointSweeps;
+}
+static_assert(joint_sweeps(kMaxSubsteps) > 0, "the first of them turns the impulses of joints");
+
 /// A contact as a damped spring whose coefficients depend on the substep, so that it is stable for
 /// every stiffness (Catto, Solver2D, 2023).
 struct Softness {
@@ -46,6 +58,7 @@ struct StepConstants {
   /// [1/m], > 0: points with a gap of more than its reciprocal hardly count in the centre of
   /// friction
   Real inverse_friction_gap = 0;
+  std::uint32_t joint_sweeps = 0;  ///< per substep, if there are joints
 };
 
 /// Factors of the damping ratio between movable spheres. A lower factor lets layers at the bottom
@@ -69,17 +82,18 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
   const Real highest = Real(0.25) * inverse_h;
   const bool is_set = settings.contact_hertz > 0 && settings.contact_hertz < highest;
   const Real hertz = is_set ? settings.contact_hertz : highest;
-  return {h,
-          inverse_h,
-          make_softness(hertz, kManifoldDamping * settings.damping_ratio, h),
-          make_softness(hertz, kSphereDamping * settings.damping_ratio, h),
-          make_softness(hertz, kDeepSphereDamping * settings.damping_ratio, h),
-          make_softness(2 * hertz, settings.damping_ratio, h),
-          settings.push_out_speed,
-          settings.push_out_speed / kBiasSpeedDivisor,
-          settings.restitution_threshold,
-          1 / (settings.speculative_margin > kSmallestGap ? settings.speculative_margin
-                                                          : kSmallestGap)};
+  return {
+      h,
+      inverse_h,
+      make_softness(hertz, kManifoldDamping * settings.damping_ratio, h),
+      make_softness(hertz, kSphereDamping * settings.damping_ratio, h),
+      make_softness(hertz, kDeepSphereDamping * settings.damping_ratio, h),
+      make_softness(2 * hertz, settings.damping_ratio, h),
+      settings.push_out_speed,
+      settings.push_out_speed / kBiasSpeedDivisor,
+      settings.restitution_threshold,
+      1 / (settings.speculative_margin > kSmallestGap ? settings.speculative_margin : kSmallestGap),
+      joint_sweeps(settings.substeps)};
 }
 
 /// Part of a row that has no parts.

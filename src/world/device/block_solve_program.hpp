@@ -70,8 +70,8 @@ struct BlockSolveProgram : RowSolver<kKinds> {
   [[gnu::always_inline]] JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed() || !is_selected()) return;
     const StepData& d = data;
-    Sweep sweep(team.cached_bins(d.counters->bin_begin));
-    const SweepList sweeps{d.substeps, d.counters->any_rebound != 0};
+    const SweepList sweeps{d.substeps, d.counters->any_rebound != 0, d.joint_sweeps()};
+    Sweep sweep(team.cached_bins(d.counters->bin_begin), sweeps);
     const bool has_overflow = sweep.overflow() > 0;
     for (std::uint32_t s = 0; s <= sweeps.size(); ++s) {
       sweep.number = s;
@@ -130,6 +130,12 @@ struct BlockSolveProgram : RowSolver<kKinds> {
         return;
       case SweepKind::warm_start:
         return f(soft_step::WarmStart{});
+      case SweepKind::first_joints:
+      case SweepKind::joints:
+        if constexpr (kKinds > soft_step::kContactRowKinds) {
+          f(soft_step::SolveJoints{{data.constants, kind == SweepKind::first_joints}});
+        }
+        return;
       case SweepKind::bias:
         return f(soft_step::Solve<true>{data.constants});
       case SweepKind::relax:
@@ -291,10 +297,12 @@ struct BlockSolveProgram : RowSolver<kKinds> {
     }
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
-      const std::uint32_t moves = SweepList::moves(phase.sweep);
+      const std::uint32_t moves = phase.sweeps.moves(phase.sweep);
       orientation_a = d.orientation_cells[body_at[inner.a]].load(moves);
       orientation_b = d.orientation_cells[body_at[inner.b]].load(moves);
-      context.orientations = {&orientation_a, &orientation_b};
+      const Quat* start = d.step.bodies.orientation;
+      context.orientations = {&orientation_a, &orientation_b, &start[body_at[inner.a]],
+                              &start[body_at[inner.b]]};
     }
     Real restitution = 0;
     if constexpr (kIsSphere) restitution = row.restitution;
@@ -398,7 +406,7 @@ struct BlockSolveProgram : RowSolver<kKinds> {
         state.shift_changed = state.rotation_changed = true;
         if constexpr (kKinds > soft_step::kContactRowKinds) {
           if (d.is_joined(i)) {
-            d.orientation_cells[i].store(d.step.orientation[i], SweepList::moves(phase.sweep));
+            d.orientation_cells[i].store(d.step.orientation[i], phase.sweeps.moves(phase.sweep));
           }
         }
         break;

@@ -231,8 +231,7 @@ class BodyCells {
   // changes older than another.
   // All tickets are below VectorCells::kMixed. The sweeps of a step are the warm start, the sweeps
   // of the substeps, and the restitution.
-  static_assert((soft_step::kSweepsPerSubstep * kMaxSubsteps + 2) * Tickets::kPerSweep <
-                kTicketMask);
+  static_assert((soft_step::kMostSweeps + 2) * Tickets::kPerSweep < kTicketMask);
 
   MotionCells* motion_;
   FreeCells* free_;

@@ -28,7 +28,15 @@ class JointBuffers {
     for (int i = 0; i < 2; ++i) to.kept[i] = kept_[i].data();
     if (from.count > 0) {
       data->orientation_cells = transfer.room(&orientation_cells_, room);
-      data->distance_rows = transfer.room_to_grow(&distance_rows_, from.count);
+      data->step.moved_rotation = transfer.room(&moved_rotation_, room);
+      for (std::uint32_t& count : to.of_kind) count = 0;
+      for (std::uint32_t joint = 0; joint < from.count; ++joint) {
+        if (!from.is_used(joint)) continue;
+        const soft_step::RowKind kind = soft_step::kind_of_joint(from.inputs[joint].type);
+        ++to.of_kind[kind - soft_step::kContactRowKinds];
+      }
+      data->distance_rows = transfer.room_to_grow(&distance_rows_, to.of_kind[0]);
+      data->frame_rows = transfer.room_to_grow(&frame_rows_, to.of_kind[1]);
     }
     transfer.wait();
   }
@@ -45,7 +53,9 @@ class JointBuffers {
   Buffer<soft_step::JointInput> inputs_;
   Buffer<soft_step::KeptJoint> kept_[2];
   Buffer<OrientationCells> orientation_cells_;
+  Buffer<Vec3> moved_rotation_;
   Buffer<soft_step::DistanceRow> distance_rows_;
+  Buffer<soft_step::FrameRow> frame_rows_;
 };
 
 }  // namespace device

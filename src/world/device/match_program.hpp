@@ -41,6 +41,12 @@ struct MatchProgram {
     });
     if (d.world_joints.count > 0) {
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) { match_joint(joint); });
+      team.for_each(d.world_joints.count, [&](std::uint32_t joint) {
+        const soft_step::JointInput& input = d.joints().inputs[joint];
+        if (input.is_used == 0 || input.drives == 0) return;
+        d.constrained[input.a] = soft_step::kHasDrive;
+        if (input.b != soft_step::kWorld) d.constrained[input.b] = soft_step::kHasDrive;
+      });
     }
     if (d.counters->uncolored[0] <= kFewContacts) {
       team.in_one_block([&](const auto& block) { color(block); });

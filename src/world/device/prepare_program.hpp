@@ -156,8 +156,11 @@ struct PrepareProgram {
     const StepData& d = data;
     const std::uint32_t points_end =
         rows->points + atomic_add(&d.counters->inner_points, rows->points);
-    const std::uint32_t capacity[soft_step::kRowKinds] = {
-        d.sphere_row_capacity, d.capacity.manifold_rows, d.world_joints.count};
+    std::uint32_t capacity[soft_step::kRowKinds] = {d.sphere_row_capacity,
+                                                    d.capacity.manifold_rows};
+    for (std::uint32_t kind = soft_step::kContactRowKinds; kind < soft_step::kRowKinds; ++kind) {
+      capacity[kind] = d.world_joints.of_kind[kind - soft_step::kContactRowKinds];
+    }
     for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
       std::uint32_t* const next = rows->next[kind];
       std::uint32_t count = 0;

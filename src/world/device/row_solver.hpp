@@ -228,7 +228,9 @@ struct RowSolver {
     if constexpr (Row::kReadsOrientation) {
       orientation_a = data.orientation_cells[item->a.index].load(sweep.moves());
       orientation_b = data.orientation_cells[item->b.index].load(sweep.moves());
-      context.orientations = {&orientation_a, &orientation_b};
+      const Quat* start = data.step.bodies.orientation;
+      context.orientations = {&orientation_a, &orientation_b, &start[item->a.index],
+                              &start[item->b.index]};
     }
     operation.template run<false>(&row, context);
     const auto write = [&](ItemBody* body) {
@@ -335,7 +337,8 @@ struct RowSolver {
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
       orientation_a = data.step.orientation[row.a];
-      context.orientations = {&orientation_a, &orientation_b};
+      context.orientations = {&orientation_a, &orientation_b, &data.step.bodies.orientation[row.a],
+                              nullptr};
     }
     if (!Row::kReadsOrientation || row.b != soft_step::kWorld) {
       fixed = fixed_body(row.b, sweep.moves());

@@ -5,7 +5,9 @@
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 
+#include <algorithm>
 #include <cstdint>
+#include <iterator>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -69,7 +71,9 @@ class ScratchBuffers {
     d.sphere_rows = {transfer.room(&sphere_rows_, contacts), contacts};
     d.sphere_row_capacity = static_cast<std::uint32_t>(contacts);
     if (may_have_blocks_) {
-      const std::size_t capacities[] = {contacts, c.manifold_rows, d.world_joints.count};
+      std::size_t capacities[soft_step::kRowKinds] = {contacts, c.manifold_rows};
+      std::copy(std::begin(d.world_joints.of_kind), std::end(d.world_joints.of_kind),
+                capacities + soft_step::kContactRowKinds);
       std::uint32_t* next = transfer.room(&inner_contacts_, rows + c.manifold_rows);
       for (std::size_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
         d.inner_contacts[kind] = next;

@@ -28,18 +28,26 @@ struct SolveProgram : RowSolver<kKinds> {
   static constexpr std::size_t kItemsPerThread = 32;
   using RowSolver<kKinds>::data;
 
-  /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has a bias
-  /// sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The last sweep is the
-  /// restitution. Sweep::moves() and the highest ticket of BodyCells depend on this.
+  /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has sweeps
+  /// over joints, a bias sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The
+  /// last sweep is the restitution. Sweep::moves() and the highest ticket of BodyCells depend on
+  /// this.
   template <class Team>
   [[gnu::always_inline]] JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
     const StepData& d = data;
     const bool rebounds = d.counters->any_rebound != 0;
-    Sweep sweep(team.cached_bins(d.counters->bin_begin));
+    const SweepList sweeps{d.substeps, rebounds, d.joint_sweeps()};
+    Sweep sweep(team.cached_bins(d.counters->bin_begin), sweeps);
     run(team, sweep, soft_step::WarmStart{});
     for (std::uint32_t substep = 0; substep < d.substeps; ++substep) {
       const bool is_last = substep + 1 == d.substeps;
+      if constexpr (kKinds > soft_step::kContactRowKinds) {
+        for (std::uint32_t k = 0; k < sweeps.joint_sweeps; ++k) {
+          sweep.start(BodyStage::none);
+          run(team, sweep, soft_step::SolveJoints{{d.constants, k == 0}});
+        }
+      }
       sweep.start(BodyStage::move);
       run(team, sweep, soft_step::Solve<true>{d.constants});
       for (std::uint32_t k = 1; k <= soft_step::kRelaxSweeps; ++k) {

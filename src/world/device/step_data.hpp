@@ -90,7 +90,6 @@ struct StepCounters {
   std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
   std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
   std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
-  std::uint32_t unused = 0;                             ///< instead of padding
   std::uint64_t largest_coordinate = 0;                 ///< partition::magnitude_of()
 
   std::uint32_t candidates = 0, touches = 0;
@@ -144,6 +143,8 @@ struct DeviceJoints {
   const soft_step::JointInput* inputs = nullptr;
   soft_step::KeptJoint* kept[2] = {};  ///< of the last two steps, indexed as Progress::contacts
   std::uint32_t count = 0;             ///< number of slots
+  /// By kind of row of joints: number of joints.
+  std::uint32_t of_kind[soft_step::kRowKinds - soft_step::kContactRowKinds] = {};
 };
 
 /// Arrays that are sorted by key, and as much memory for the sort.
@@ -199,6 +200,7 @@ struct StepData {
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
   soft_step::DistanceRow* distance_rows = nullptr;
+  soft_step::FrameRow* frame_rows = nullptr;
   std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
   /// By block, kind and color: the first inner row, as a number in its kind; see inner_begin().
@@ -221,9 +223,11 @@ struct StepData {
   JFPX_HD Row* rows() const {
     if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
       return manifold_rows;
-    } else {
-      static_assert(std::is_same_v<Row, soft_step::DistanceRow>);
+    } else if constexpr (std::is_same_v<Row, soft_step::DistanceRow>) {
       return distance_rows;
+    } else {
+      static_assert(std::is_same_v<Row, soft_step::FrameRow>);
+      return frame_rows;
     }
   }
   /// The parts of a row; null if it has none.
@@ -305,9 +309,13 @@ struct StepData {
     const DeviceJoints& all = world_joints;
     return {all.inputs, all.kept[1 - parity()], all.kept[parity()], all.count};
   }
+  /// Number of sweeps over joints in a substep.
+  JFPX_HD std::uint32_t joint_sweeps() const {
+    return world_joints.count > 0 ? constants.joint_sweeps : 0;
+  }
   /// Whether a body has joints, once MatchProgram is complete.
   JFPX_HD bool is_joined(std::uint32_t body) const {
-    return world_joints.count > 0 && constrained[body] == soft_step::kHasJoint;
+    return world_joints.count > 0 && constrained[body] >= soft_step::kHasJoint;
   }
   JFPX_HD soft_step::Islands islands() const {
     return {.step = step,
@@ -322,7 +330,7 @@ struct StepData {
             joints(),
             {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, step.traits,
              bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
-             materials, bodies.position, step.orientation},
+             materials, bodies.position, step.orientation, bodies.orientation},
             step.solver,
             constants.restitution_threshold,
             constants.inverse_friction_gap};

@@ -23,13 +23,22 @@ enum class BodyStage : std::uint8_t {
 };
 
 /// What a sweep does with the rows.
-enum class SweepKind : std::uint8_t { none, warm_start, bias, relax, restitution };
+enum class SweepKind : std::uint8_t {
+  none,
+  warm_start,
+  first_joints,
+  joints,
+  bias,
+  relax,
+  restitution
+};
 
 /// The sweeps of a step, in the order of SoftStep::solve(): the warm start, those of the substeps,
 /// and the restitution of manifolds.
 struct SweepList {
   std::uint32_t substeps = 0;
   bool restitutes = false;
+  std::uint32_t joint_sweeps = 0;  ///< per substep
 
   /// Number of sweeps.
   JFPX_HD std::uint32_t size() const { return end_of_substeps() + (restitutes ? 1 : 0); }
@@ -37,40 +46,43 @@ struct SweepList {
     if (sweep >= size()) return SweepKind::none;
     if (sweep == 0) return SweepKind::warm_start;
     if (sweep == end_of_substeps()) return SweepKind::restitution;
-    return is_bias(sweep) ? SweepKind::bias : SweepKind::relax;
+    const std::uint32_t k = in_substep(sweep);
+    if (k < joint_sweeps) return k == 0 ? SweepKind::first_joints : SweepKind::joints;
+    return k == joint_sweeps ? SweepKind::bias : SweepKind::relax;
   }
   /// Work on the bodies between the rows of a sweep and those of the sweep before.
   JFPX_HD BodyStage stage_before(std::uint32_t sweep) const {
     if (sweep == size()) return BodyStage::finish;
     if (sweep < 2 || sweep >= end_of_substeps()) return BodyStage::none;
-    if (is_bias(sweep)) return BodyStage::accelerate;
-    return is_bias(sweep - 1) ? BodyStage::move : BodyStage::none;
+    if (in_substep(sweep) == 0) return BodyStage::accelerate;
+    return in_substep(sweep) == joint_sweeps + 1 ? BodyStage::move : BodyStage::none;
   }
   /// Whether a sweep stores the final impulses of the rows.
   JFPX_HD bool stores_impulses(std::uint32_t sweep) const { return sweep + 1 == end_of_substeps(); }
   /// Number of moves of the bodies before the rows of a sweep are solved.
-  JFPX_HD static std::uint32_t moves(std::uint32_t sweep) {
-    return (sweep + soft_step::kRelaxSweeps - 1) / soft_step::kSweepsPerSubstep;
+  JFPX_HD std::uint32_t moves(std::uint32_t sweep) const {
+    return (sweep + soft_step::kRelaxSweeps - 1) / per_substep();
   }
 
  private:
-  JFPX_HD std::uint32_t end_of_substeps() const {
-    return 1 + substeps * soft_step::kSweepsPerSubstep;
-  }
-  JFPX_HD static bool is_bias(std::uint32_t sweep) {
-    return (sweep - 1) % soft_step::kSweepsPerSubstep == 0;
+  JFPX_HD std::uint32_t end_of_substeps() const { return 1 + substeps * per_substep(); }
+  JFPX_HD std::uint32_t per_substep() const { return joint_sweeps + soft_step::kSweepsPerSubstep; }
+  /// Number of a sweep of a substep.
+  JFPX_HD std::uint32_t in_substep(std::uint32_t sweep) const {
+    return (sweep - 1) % per_substep();
   }
 };
 
 /// The rows of a sweep, except rows of blocks.
 struct Sweep {
-  const std::uint32_t* begin;       ///< Counters::bin_begin
+  const std::uint32_t* begin;  ///< Counters::bin_begin
+  SweepList sweeps;
   std::uint32_t colored_items = 0;  ///< number of items for all rows of colors
   std::uint32_t number = 0;
   BodyStage stage = BodyStage::none;  ///< after the rows; not used by BlockSolveProgram
   bool stores_impulses = false;       ///< whether this sweep stores the final impulses of the rows
 
-  JFPX_HD explicit Sweep(const std::uint32_t* bins) : begin(bins) {
+  JFPX_HD Sweep(const std::uint32_t* bins, const SweepList& all) : begin(bins), sweeps(all) {
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
       for (std::uint32_t group = soft_step::group_of_crossing(0); group < soft_step::kFixedGroup;
            ++group) {
@@ -104,7 +116,7 @@ struct Sweep {
     stage = next;
   }
   /// See SweepList.
-  JFPX_HD std::uint32_t moves() const { return SweepList::moves(number); }
+  JFPX_HD std::uint32_t moves() const { return sweeps.moves(number); }
 };
 
 /// Iterates over the crossing rows in sweep order: by color, then by kind.

@@ -37,8 +37,10 @@ struct JoinedBodies {
 };
 JoinedBodies joined_bodies(const Joint& joint) noexcept;
 
-/// Impulse that pulls the bodies together in the last substep [N s].
-Real pull_of(const DistanceJoint& joint, const soft_step::KeptJoint& kept) noexcept;
+/// Whether a joint has axes, in addition to anchors.
+inline bool has_frames(const Joint& joint) noexcept {
+  return !std::holds_alternative<DistanceJoint>(joint);
+}
 
 /// Owns the joints, their ids, and their impulses and colors for warm starting.
 class JointStore {
@@ -53,7 +55,10 @@ class JointStore {
   std::uint32_t require(JointId id) const;
   JointId id(std::uint32_t joint) const { return pool_.id(joint); }
   const Joint& joint(std::uint32_t joint) const { return joints_[joint]; }
+  /// Whether any joint has frames.
+  bool any_frames() const noexcept;
   const soft_step::KeptJoint& kept(std::uint32_t joint) const { return last_[joint]; }
+  const soft_step::JointInput& input(std::uint32_t joint) const { return inputs_[joint]; }
 
   /// @param joint must have passed validation
   /// @throws std::bad_alloc; the store is then unchanged

@@ -17,9 +17,13 @@ using soft_step::KeptJoint;
 
 void serialize_kept(auto& archive, Is<KeptJoint> auto& kept) {
   auto& [impulses, color, unused] = kept;
+  // Those of a DistanceJoint; a joint with frames has more.
   archive(impulses[0], impulses[1], impulses[2], color);
 }
-static_assert(KeptJoint::kMostImpulses == 3);
+/// The other impulses of a joint with frames.
+void serialize_frames(auto& archive, Is<KeptJoint> auto& kept) {
+  for (std::uint32_t i = 3; i < KeptJoint::kMostImpulses; ++i) archive(kept.impulses[i]);
+}
 
 void check_bodies(const Joint& joint, const BodyStore& bodies) {
   const std::string found = find_fault(joint);
@@ -41,6 +45,7 @@ void write_joints(BinaryWriter* writer, const JointStore& joints) {
   for (const JointId id : joints.ids()) {
     write(id.index, joints.joint(id.index));
     serialize_kept(write, joints.kept(id.index));
+    if (has_frames(joints.joint(id.index))) serialize_frames(write, joints.kept(id.index));
   }
 }
 
@@ -59,6 +64,7 @@ JointStore read_joints(BinaryReader* reader, SnapshotColors* colors, BodyStore* 
     const auto joint = reader->get<Joint>();
     KeptJoint kept;
     serialize_kept(*reader, kept);
+    if (has_frames(joint)) serialize_frames(*reader, kept);
     check_bodies(joint, *bodies);
     const JoinedBodies joined = joined_bodies(joint);
     colors->add(*bodies, joined.a, joined.b, kept.color,

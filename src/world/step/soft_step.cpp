@@ -76,6 +76,7 @@ void SoftStep::prepare(const BodyStore& bodies) {
   bodies_.resize(capacity);
   traits_.resize(capacity);
   orientation_.resize(capacity);
+  if (joints_.count > 0) moved_rotation_.resize(capacity);
   free_.resize(capacity);
   marked_.resize(capacity);
   parent_.resize(capacity);
@@ -109,8 +110,10 @@ void SoftStep::mark_constrained() {
   for (std::uint32_t joint = 0; joint < joints_.count; ++joint) {
     if (!joints_.is_used(joint)) continue;
     const soft_step::JointInput& input = joints_.inputs[joint];
-    constrained_[input.a] = soft_step::kHasJoint;
-    if (input.b != soft_step::kWorld) constrained_[input.b] = soft_step::kHasJoint;
+    const std::uint8_t value = input.drives != 0 ? soft_step::kHasDrive : soft_step::kHasJoint;
+    for (const std::uint32_t body : {input.a, input.b}) {
+      if (body != soft_step::kWorld) constrained_[body] = std::max(constrained_[body], value);
+    }
   }
 }
 
@@ -165,8 +168,8 @@ std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
 }
 
 std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointView& joints) {
-  prepare(*bodies);
   joints_ = joints;
+  prepare(*bodies);
   cache_.match({bodies->inverse_masses(), bodies->moving.place, bodies->has_blocks()},
                bodies->any_rolls(), joints, pool_);
   mark_constrained();
@@ -176,6 +179,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
            .traits = traits_.data(),
            .orientation = orientation_.data(),
            .constrained = constrained_.data(),
+           .moved_rotation = moved_rotation_.data(),
            .h = constants_.h};
   if (any_body(*bodies, [this](std::uint32_t i) { return step_.bodies.is_asleep(i); })) {
     islands_of(*bodies).wake_touched(PoolTeam(pool_));
@@ -194,7 +198,8 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
                                 .spinning_friction = view.spinning_friction,
                                 .rules = materials_,
                                 .position = view.position,
-                                .orientation = orientation_.data()},
+                                .orientation = orientation_.data(),
+                                .start_orientation = view.orientation},
                  .start = bodies_.data(),
                  .restitution_threshold = constants_.restitution_threshold,
                  .inverse_friction_gap = constants_.inverse_friction_gap},
@@ -212,6 +217,10 @@ void SoftStep::run_substeps(const BodyStore& bodies) {
       step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);
     });
     if (substep == 0) solver_.sweep(Sweep::warm_start);
+    if (joints_.count > 0) {
+      solver_.sweep(Sweep::first_joints);
+      for (std::uint32_t k = 1; k < constants_.joint_sweeps; ++k) solver_.sweep(Sweep::joints);
+    }
     solver_.sweep(Sweep::bias);
     for_each_body(bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
     for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.sweep(Sweep::relax);

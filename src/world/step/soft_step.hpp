@@ -88,6 +88,7 @@ class SoftStep {
   std::vector<soft_step::SolverBody> bodies_;  ///< by body
   std::vector<std::uint8_t> traits_;           ///< by body: soft_step::BodyTraits
   std::vector<Quat> orientation_;              ///< by body, during the step
+  std::vector<Vec3> moved_rotation_;           ///< by body, if there are joints
   std::vector<soft_step::FreeMotion> free_;    ///< by body
   std::vector<std::uint8_t> constrained_;      ///< by body: StepBodies::constrained
   std::vector<std::uint32_t> parent_;          ///< by body: soft_step::DisjointSets::parent

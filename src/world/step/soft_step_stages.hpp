@@ -41,8 +41,9 @@ JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& m
   if (mark == kTouchesSlowBody) motion.wake_by_slow_body(bodies, i);
 }
 
-/// Values of StepBodies::constrained. A body with joints may have contacts, too.
-inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2;
+/// Values of StepBodies::constrained. A body with joints may have contacts, too; kHasDrive: one of
+/// the joints has a spring or a motor.
+inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2, kHasDrive = 3;
 
 /// Calls f(a, b) if a joint is one of two bodies.
 template <class F>
@@ -58,8 +59,10 @@ struct StepBodies {
   SolverBody* solver = nullptr;
   std::uint8_t* traits = nullptr;             ///< bits of BodyTraits
   Quat* orientation = nullptr;                ///< during the step
-  const std::uint8_t* constrained = nullptr;  ///< kHasContact, kHasJoint, or 0
-  Real h = 0;                                 ///< [s], length of a substep
+  const std::uint8_t* constrained = nullptr;  ///< one of the values above, or 0
+  /// SolverBody::rotation after the last move, of bodies with joints.
+  Vec3* moved_rotation = nullptr;
+  Real h = 0;  ///< [s], length of a substep
 
   /// Initializes a body for the step.
   JFPX_HD void load(std::uint32_t i) const {
@@ -74,6 +77,7 @@ struct StepBodies {
     solver[i] = body;
     traits[i] = traits_of(i, body);
     orientation[i] = bodies.orientation[i];
+    if (constrained[i] >= kHasJoint) moved_rotation[i] = {};
   }
 
   JFPX_HD std::uint8_t traits_of(std::uint32_t i, const SolverBody& body) const {
@@ -116,8 +120,13 @@ struct StepBodies {
   JFPX_HD void move(std::uint32_t i, SolverBody* body) const {
     if (bodies.awake[i] == 0) return;
     body->shift = add_scaled(body->shift, body->velocity, h);
-    body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
     orientation[i] = turned(orientation[i], *body);
+    if (constrained[i] >= kHasJoint) {
+      const Vec3 projected = body->rotation - moved_rotation[i];
+      if (!(projected == Vec3{})) orientation[i] = rotated_by(orientation[i], projected);
+    }
+    body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
+    if (constrained[i] >= kHasJoint) moved_rotation[i] = body->rotation;
   }
 
   /// The orientation of a body after a substep. An overflow makes it zero until the step is undone.
@@ -150,7 +159,8 @@ struct StepBodies {
       const StepMotion moved{body.shift, turn_of_step(i), body.velocity - bodies.velocity[i]};
       motion.end_step(bodies, i, state(i));
       if (bodies.movable(i)) {
-        const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{});
+        const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{}) ||
+                               constrained[i] == kHasDrive;
         motion.update_rest_time(bodies, i, is_driven, moved);
         rests = bodies.is_at_rest(i);
       }

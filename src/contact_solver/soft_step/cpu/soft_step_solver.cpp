@@ -100,6 +100,13 @@ cpu::SweepSoftness softness(const Softness& s) {
   return {s.bias_rate, s.mass_scale, s.impulse_scale};
 }
 
+/// Whether a sweep solves rows of a type.
+template <class Row>
+bool takes_part(Sweep sweep) {
+  const bool is_of_joints = sweep == Sweep::first_joints || sweep == Sweep::joints;
+  return !is_of_joints || kKindOf<Row> >= kContactRowKinds;
+}
+
 /// The function of kernels for a sweep.
 template <class Kernels>
 auto function_of(const Kernels& kernels, Sweep sweep) {
@@ -440,6 +447,9 @@ void SoftStepSolver::with_operation(Sweep sweep, const F& f) {
   switch (sweep) {
     case Sweep::warm_start:
       return f(WarmStart());
+    case Sweep::first_joints:
+      return f(Solve<true>{constants_, true});
+    case Sweep::joints:
     case Sweep::bias:
       return f(Solve<true>{constants_});
     case Sweep::relax:
@@ -464,9 +474,13 @@ void SoftStepSolver::run_row(Rows<Row>* rows, std::size_t i, const Operation& op
     context.bodies.inertia_b = &inertia[row.b];
   }
   if constexpr (Row::kReadsOrientation) {
-    const Quat* const orientation = setup_.properties.orientation;
-    context.orientations = {&orientation[row.a],
-                            row.b == kWorld ? &world_orientation_ : &orientation[row.b]};
+    const BodyProperties& properties = setup_.properties;
+    context.orientations = {&properties.orientation[row.a], &world_orientation_,
+                            &properties.start_orientation[row.a], &world_orientation_};
+    if (row.b != kWorld) {
+      context.orientations.b = &properties.orientation[row.b];
+      context.orientations.start_b = &properties.start_orientation[row.b];
+    }
   }
   operation.template run<decltype(is_fixed)::value>(&row, context);
 }
@@ -494,6 +508,7 @@ template <bool kFixed, class Row, class Operation>
 void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, Sweep sweep,
                               const Operation& operation) {
   using IsFixed = std::bool_constant<kFixed>;
+  if (!takes_part<Row>(sweep)) return;
   constexpr bool kHasKernel =
       std::is_same_v<Row, ManifoldRow> || (std::is_same_v<Row, SphereRow> && !kFixed);
   if constexpr (kHasKernel) {
@@ -544,10 +559,13 @@ void SoftStepSolver::sweep_crossing(Sweep sweep) {
       // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
       std::size_t count = 0;
       for_all_kinds([&](auto* rows) {
+        using Row = std::remove_cvref_t<decltype(rows->rows[0])>;
+        if (!takes_part<Row>(sweep)) return;
         const RowTable& table = rows->table;
         count +=
             table.end(table.crossing(parts - 1, color)) - table.begin(table.crossing(0, color));
       });
+      if (count == 0) continue;
       // All colors are divided at the same parts, so that a thread has most of the bodies in its
       // cache.
       const std::size_t chunk = std::max<std::size_t>(1, parts * kRowsPerChunk / (count + 1));

@@ -25,7 +25,9 @@ namespace soft_step {
 
 /// A sweep over all rows.
 enum class Sweep : std::uint8_t {
-  warm_start,  ///< applies the impulses of the last step
+  warm_start,    ///< applies the impulses of the last step
+  first_joints,  ///< bias sweep over the rows of joints only, the first one of a substep
+  joints,        ///< another one
   bias,
   relax,
   restitution  ///< of manifolds; rows of spheres rebound in the bias and relax sweeps
