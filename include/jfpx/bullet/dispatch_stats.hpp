@@ -44,6 +44,22 @@ inline constexpr std::size_t kOrderReasonCount = 7;
 /// A short text for a table, for example "contact callback".
 JFPX_API std::string_view to_string(OrderReason reason) noexcept;
 
+/// Reason why Bullet processed a pair of a convex and a concave shape on one thread. The bits are
+/// identical either way.
+enum class ConcaveFallback : std::uint8_t {
+  none,
+  concave_class,    ///< not exactly Bullet's triangle mesh, scaled mesh or height field
+  convex_class,     ///< not exactly one of Bullet's classes, or one that may have own state
+  create_function,  ///< the user has registered another create function for triangles
+  separating_axes,  ///< m_enableSatConvex, and a polyhedral shape
+  not_finite,       ///< a coordinate is infinite, NaN or very large
+  verified,         ///< set_verify(true), and a shape other than a sphere
+};
+inline constexpr std::size_t kConcaveFallbackCount = 7;
+
+/// A short text for a table, for example "class of the concave shape".
+JFPX_API std::string_view to_string(ConcaveFallback fallback) noexcept;
+
 /// Counters since construction or reset_stats(). Pairs are counted only in batches; a batch without
 /// active bodies changes no manifold and counts only `pairs`.
 struct DispatchStats {
@@ -56,6 +72,9 @@ struct DispatchStats {
   std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
   std::uint64_t convex_pairs = 0;   ///< other pairs updated by Bullet's algorithms on any thread
+  std::uint64_t sphere_concaves =
+      0;  ///< spheres on meshes and height fields, without Bullet's algorithm
+  std::uint64_t concave_pairs = 0;  ///< other shapes on meshes and height fields, on any thread
   std::uint64_t verified = 0;       ///< pairs recomputed because of set_verify(true)
   std::uint64_t mismatches = 0;     ///< verified pairs that differ in any field
   std::string first_mismatch;       ///< field and both values; empty without a mismatch
@@ -64,13 +83,15 @@ struct DispatchStats {
   std::array<std::uint64_t, kOrderReasonCount>
       ordered{};  ///< batches by OrderReason; `none` counts the unordered ones
   OrderReason last_order = OrderReason::none;  ///< of the last batch
-  std::uint64_t to_device = 0;                 ///< bytes that the collider sent to a device
-  std::uint64_t from_device = 0;               ///< bytes that the collider received from a device
-  std::string failure;         ///< error of the last dispatch that ran out of memory
-  std::string device_failure;  ///< why the CPU replaced the device; empty if it has not
-  std::string warning;         ///< set if the program fuses products and sums; see fused.hpp
-  double prepare_ms = 0;       ///< wall clock of batches: gather, collider, read manifolds
-  double commit_ms = 0;        ///< wall clock of batches: update of the manifolds
+  std::array<std::uint64_t, kConcaveFallbackCount>
+      concave_fallbacks{};        ///< pairs of unordered batches by ConcaveFallback
+  std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
+  std::uint64_t from_device = 0;  ///< bytes that the collider received from a device
+  std::string failure;            ///< error of the last dispatch that ran out of memory
+  std::string device_failure;     ///< why the CPU replaced the device; empty if it has not
+  std::string warning;            ///< set if the program fuses products and sums; see fused.hpp
+  double prepare_ms = 0;          ///< wall clock of batches: gather, collider, read manifolds
+  double commit_ms = 0;           ///< wall clock of batches: update of the manifolds
 };
 
 }  // namespace bullet

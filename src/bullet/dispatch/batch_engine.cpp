@@ -191,7 +191,14 @@ void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlapp
   const std::size_t n = pairs_.size();
   if (verify_) convex_check_.remember(batch_);
   // set_verify() runs Bullet's algorithms itself, to compare the results with those of jfpx.
-  const ConvexDispatch dispatch{dispatcher, info, batch_, pairs_, !verify_};
+  triangle_algorithms_.read(dispatcher);
+  const ConvexDispatch dispatch{.dispatcher = dispatcher,
+                                .info = info,
+                                .batch = batch_,
+                                .pairs = pairs_,
+                                .runs_algorithms = !verify_,
+                                .triangle_algorithms = triangle_algorithms_,
+                                .ignores_separated = TriangleAlgorithms::ignores_separated()};
   add(unordered_commit_.run(dispatch, touching_, pool_));
   if (verify_) check_convex(dispatcher, info);
   unordered_commit_.sort_remaining(pairs_, info.m_deterministicOverlappingPairs);
@@ -235,6 +242,11 @@ void BatchEngine::add(const CommitCounts& counts) {
   stats_.sphere_boxes += counts.sphere_boxes;
   stats_.sphere_planes += counts.sphere_planes;
   stats_.convex_pairs += counts.convex_pairs;
+  stats_.sphere_concaves += counts.sphere_concaves;
+  stats_.concave_pairs += counts.concave_pairs;
+  for (std::size_t i = 1; i < kConcaveFallbackCount; ++i) {
+    stats_.concave_fallbacks[i] += counts.concave_fallbacks[i];
+  }
 }
 
 void BatchEngine::check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,

@@ -76,6 +76,7 @@ class JFPX_API BatchEngine {
   SphereBatch batch_;
   UnorderedCommit unordered_commit_;
   OrderedCommit ordered_commit_;
+  TriangleAlgorithms triangle_algorithms_;
   ConvexCheck convex_check_;  ///< for set_verify()
   DispatchStats stats_;
   // State of the running dispatch:

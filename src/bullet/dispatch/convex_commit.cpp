@@ -7,6 +7,7 @@
 #include "src/bullet/dispatch/convex_commit.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/concave_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/plane_gap.hpp"
 #include "src/bullet/exact_class.hpp"
@@ -44,8 +45,15 @@ bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
       return (b & kPlane) != 0 && is_convex(*batch.body_a(i), a);
     case PairKind::plane_convex:
       return (a & kPlane) != 0 && is_convex(*batch.body_b(i), b);
+    case PairKind::convex_concave:
+    case PairKind::concave_convex:
+      return true;  // commit_concave() reads the classes
   }
   return false;
+}
+
+bool is_concave(PairKind kind) {
+  return kind == PairKind::convex_concave || kind == PairKind::concave_convex;
 }
 
 /// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
@@ -96,6 +104,11 @@ CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
   sphere_boxes += other.sphere_boxes;
   sphere_planes += other.sphere_planes;
   convex_pairs += other.convex_pairs;
+  sphere_concaves += other.sphere_concaves;
+  concave_pairs += other.concave_pairs;
+  for (std::size_t i = 0; i < concave_fallbacks.size(); ++i) {
+    concave_fallbacks[i] += other.concave_fallbacks[i];
+  }
   return *this;
 }
 
@@ -109,6 +122,7 @@ bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* 
                                             batch.body_a(i), batch.body_b(i))) {
     return true;
   }
+  if (is_concave(batch.kind(i))) return commit_concave(dispatch, i, counts);
   if (update_sphere(batch, i, counts)) return true;
   if (!dispatch.runs_algorithms) return false;
   if (!is_clear_box(batch, i)) run_algorithm(dispatch, i);

@@ -4,9 +4,11 @@
 #include <jfpx/bullet/dispatch_stats.hpp>
 
 #include "src/bullet/dispatch/sphere_batch.hpp"
+#include "src/bullet/dispatch/triangle_algorithms.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 
+#include <array>
 #include <span>
 
 namespace jfpx {
@@ -21,6 +23,9 @@ struct CommitCounts {
   std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
   std::uint64_t convex_pairs = 0;   ///< other convex pairs, updated by Bullet's algorithms if close
+  std::uint64_t sphere_concaves = 0;  ///< spheres on concave shapes, without Bullet's algorithm
+  std::uint64_t concave_pairs = 0;    ///< other convex shapes on concave shapes
+  std::array<std::uint64_t, kConcaveFallbackCount> concave_fallbacks{};  ///< by reason
 
   CommitCounts& operator+=(const CommitCounts& other);
 };
@@ -33,6 +38,9 @@ struct ConvexDispatch {
   std::span<const btBroadphasePair> pairs;
   /// Whether Bullet's own algorithms may run on the calling thread.
   bool runs_algorithms;
+  const TriangleAlgorithms& triangle_algorithms;
+  /// See TriangleAlgorithms::ignores_separated().
+  bool ignores_separated;
 };
 
 /// Updates the manifold of pair i on the calling thread, if neither other pairs nor user code can

@@ -95,6 +95,26 @@ std::string_view to_string(OrderReason reason) noexcept {
   return "unknown";
 }
 
+std::string_view to_string(ConcaveFallback fallback) noexcept {
+  switch (fallback) {
+    case ConcaveFallback::none:
+      return "none";
+    case ConcaveFallback::concave_class:
+      return "class of the concave shape";
+    case ConcaveFallback::convex_class:
+      return "class of the convex shape";
+    case ConcaveFallback::create_function:
+      return "create function for triangles replaced";
+    case ConcaveFallback::separating_axes:
+      return "separating axes";
+    case ConcaveFallback::not_finite:
+      return "not finite";
+    case ConcaveFallback::verified:
+      return "verified";
+  }
+  return "unknown";
+}
+
 }  // namespace bullet
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -5,6 +5,7 @@
 #include "src/bullet/prefetch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btBoxBoxCollisionAlgorithm.h>
+#include <BulletCollision/CollisionDispatch/btConvexConcaveCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btConvexPlaneCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
@@ -28,8 +29,8 @@ struct AlgorithmFields : btCollisionAlgorithm {
 
 /// Access to private members through explicit instantiation, which the language exempts from access
 /// checks. Of a btConvexConvexAlgorithm: the number of perturbations and the penetration depth
-/// solver, which it copies from its configuration. Of a btConvexPlaneCollisionAlgorithm: whether
-/// the plane is the first body.
+/// solver, which it copies from its configuration. Of a btConvexPlaneCollisionAlgorithm and a
+/// btConvexConcaveCollisionAlgorithm: whether the plane or concave shape is the first body.
 struct PerturbationTag {
   friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
 };
@@ -39,6 +40,9 @@ struct DepthSolverTag {
 struct PlaneFirstTag {
   friend bool btConvexPlaneCollisionAlgorithm::*member_of(PlaneFirstTag);
 };
+struct ConcaveFirstTag {
+  friend bool btConvexConcaveCollisionAlgorithm::*member_of(ConcaveFirstTag);
+};
 template <class Tag, auto Member>
 struct Reveal {
   friend auto member_of(Tag) -> decltype(Member) { return Member; }
@@ -46,6 +50,7 @@ struct Reveal {
 template struct Reveal<PerturbationTag, &btConvexConvexAlgorithm::m_numPerturbationIterations>;
 template struct Reveal<DepthSolverTag, &btConvexConvexAlgorithm::m_pdSolver>;
 template struct Reveal<PlaneFirstTag, &btConvexPlaneCollisionAlgorithm::m_isSwapped>;
+template struct Reveal<ConcaveFirstTag, &btConvexConcaveCollisionAlgorithm::m_isSwapped>;
 
 /// Whether Bullet's EPA computes the penetration of deep contacts. Unlike
 /// btMinkowskiPenetrationDepthSolver, it has no state shared by threads.
@@ -166,6 +171,13 @@ PairTable::Link PairTable::read_link(btCollisionAlgorithm* algorithm, const Pair
   } else if (type == &typeid(btBoxBoxCollisionAlgorithm)) {
     manifold = manifold_of<btBoxBoxCollisionAlgorithm>(algorithm);
     kind = PairKind::boxes;
+  } else if (type == &typeid(btConvexConcaveCollisionAlgorithm)) {
+    // Creates the algorithms for triangles through its own dispatcher.
+    if (algorithm->*AlgorithmFields::dispatcher != owner.dispatcher) return {};
+    auto* concave = static_cast<btConvexConcaveCollisionAlgorithm*>(algorithm);
+    manifold = manifold_of<btConvexConcaveCollisionAlgorithm>(algorithm);
+    kind = concave->*member_of(ConcaveFirstTag()) ? PairKind::concave_convex
+                                                  : PairKind::convex_concave;
   }
   if (!Link::can_hold(manifold)) return {};
   return {manifold, kind, algorithm->*AlgorithmFields::dispatcher == owner.dispatcher};

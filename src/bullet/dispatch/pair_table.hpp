@@ -25,12 +25,16 @@ inline constexpr std::size_t kPairChunk = 2048;
 
 /// Class of Bullet's algorithm of a pair.
 enum class PairKind : std::uint8_t {
-  other,         ///< no algorithm yet, or one that Bullet must run
-  spheres,       ///< btSphereSphereCollisionAlgorithm with a manifold
-  convex,        ///< btConvexConvexAlgorithm with a manifold, Bullet's EPA, without perturbation
-  convex_plane,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane second
-  plane_convex,  ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane first
-  boxes,         ///< btBoxBoxCollisionAlgorithm with a manifold
+  other,           ///< no algorithm yet, or one that Bullet must run
+  spheres,         ///< btSphereSphereCollisionAlgorithm with a manifold
+  convex,          ///< btConvexConvexAlgorithm with a manifold, Bullet's EPA, without perturbation
+  convex_plane,    ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane second
+  plane_convex,    ///< btConvexPlaneCollisionAlgorithm with a manifold, the plane first
+  boxes,           ///< btBoxBoxCollisionAlgorithm with a manifold
+  convex_concave,  ///< btConvexConcaveCollisionAlgorithm of this dispatcher, the concave shape
+                   ///< second
+  concave_convex,  ///< btConvexConcaveCollisionAlgorithm of this dispatcher, the concave shape
+                   ///< first
 };
 
 /// The dispatcher that runs the dispatch. Its own algorithms may be cached; algorithms of other
