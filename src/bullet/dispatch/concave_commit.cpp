@@ -8,11 +8,14 @@
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
 #include "src/bullet/dispatch/concave_triangles.hpp"
+#include "src/bullet/dispatch/core_distance.hpp"
+#include "src/bullet/dispatch/cores.hpp"
 #include "src/bullet/dispatch/separation_test.hpp"
 #include "src/bullet/dispatch/sphere_triangle.hpp"
 #include "src/bullet/exact_class.hpp"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -46,6 +49,75 @@ class SphereSupport {
 
  private:
   btScalar radius_;
+};
+
+/// btGjkPairDetector for a box and the triangles of a concave shape.
+class BoxDetector {
+ public:
+  BoxDetector(const btBoxShape& box, const btTransform& pose, const btTransform& triangle_pose,
+              btScalar triangle_margin, btScalar threshold)
+      : offset_((pose.getOrigin() + triangle_pose.getOrigin()) * btScalar(0.5)),
+        triangle_pose_(moved(triangle_pose)),
+        to_triangle_(triangle_pose.getBasis()),
+        pose_(moved(pose)),
+        half_(box.getImplicitShapeDimensions()),
+        core_(pose_, half_),
+        input_{.margin_a = box.btBoxShape::getMargin(),
+               .margin_b = triangle_margin,
+               .maximum_distance_squared = 0,
+               .offset = offset_} {
+    const btScalar reach = input_.margin_a + input_.margin_b + threshold;
+    input_.maximum_distance_squared = reach * reach;
+  }
+
+  /// Returns false, without a change, if Bullet's algorithm must process the triangle.
+  bool add_contact(const btVector3* vertices, btManifoldResult* result) const {
+    const TriangleCore triangle(triangle_pose_, to_triangle_, vertices);
+    DetectorInput input = input_;
+    input.are_clear = is_clear(triangle);
+    DetectorContact contact;
+    switch (find_closest_points(core_, triangle, input, &contact)) {
+      case DetectorResult::unknown:
+        return false;
+      case DetectorResult::apart:
+        return true;
+      case DetectorResult::contact:
+        break;
+    }
+    result->addContactPoint(contact.normal_on_b, contact.point_on_b, contact.distance);
+    return true;
+  }
+
+ private:
+  /// Relative to the midpoint of the two bodies, for better precision.
+  btTransform moved(btTransform pose) const {
+    pose.getOrigin() -= offset_;
+    return pose;
+  }
+
+  /// Whether a plane parallel to the triangle is well between the triangle and the core of the box.
+  bool is_clear(const TriangleCore& triangle) const {
+    const btVector3 &v0 = triangle.vertex(0), &v1 = triangle.vertex(1), &v2 = triangle.vertex(2);
+    const btVector3 normal = (v1 - v0).cross(v2 - v0);
+    const btVector3 g0 = v0 - pose_.getOrigin(), g1 = v1 - pose_.getOrigin(),
+                    g2 = v2 - pose_.getOrigin();
+    const btScalar d0 = normal.dot(g0), d1 = normal.dot(g1), d2 = normal.dot(g2);
+    const btScalar nearest =
+        btMax(btMin(btMin(d0, d1), d2), btMin(btMin(-d0, -d1), -d2));  // 0 < if on one side
+    const btScalar gap = nearest - half_.dot((normal * pose_.getBasis()).absolute());
+    const btScalar farthest2 = btMax(btMax(g0.length2(), g1.length2()), g2.length2());
+    // (x + y)^2 <= 2 (x^2 + y^2)
+    return gap > 0 &&
+           are_clear(gap * gap / normal.length2(), btScalar(2) * (farthest2 + half_.length2()));
+  }
+
+  btVector3 offset_;
+  btTransform triangle_pose_;
+  TransposedProduct to_triangle_;
+  btTransform pose_;
+  btVector3 half_;
+  BoxCore core_;
+  DetectorInput input_;
 };
 
 /// A pair and the state of its update.
@@ -86,7 +158,9 @@ class ConcavePair {
     LocalBox box;
     shape().getAabb(to_triangles, box.min, box.max);
     if (!widen(&box)) return ConcaveFallback::not_finite;
-    update_convex(*function, box);
+    begin();
+    is_plain_box(*function) ? update_box(*function, box) : update_convex(*function, box);
+    result_.refreshContactPoints();
     ++counts->concave_pairs;
     return ConcaveFallback::none;
   }
@@ -96,11 +170,12 @@ class ConcavePair {
   const btConvexShape& shape() const {
     return static_cast<const btConvexShape&>(*convex_.getCollisionShape());
   }
+  btScalar triangle_margin() const { return concave_.getCollisionShape()->getMargin(); }
   btScalar threshold() const { return manifold_.getContactBreakingThreshold(); }
 
   /// Adds the margin of the triangles. Returns false if a coordinate is not finite.
   bool widen(LocalBox* box) const {
-    const btScalar margin = concave_.getCollisionShape()->getMargin();
+    const btScalar margin = triangle_margin();
     const btVector3 extra(margin, margin, margin);
     box->max += extra;
     box->min -= extra;
@@ -180,29 +255,65 @@ class ConcavePair {
                             pose * contact.point.point_on_triangle, contact.point.distance);
   }
 
-  void update_convex(const btConvexConvexAlgorithm::CreateFunc& function, const LocalBox& box) {
-    const btScalar margin = concave_.getCollisionShape()->getMargin();
-    const btTransform& from = concave_.getWorldTransform();
-    const SeparationTest test(from, convex_.getWorldTransform(), threshold());
-    const auto support = [&](const btVector3& direction) {
-      return shape().localGetSupportingVertex(direction);
-    };
+  /// Whether BoxDetector computes the contacts of the convex shape.
+  bool is_plain_box(const btConvexConvexAlgorithm::CreateFunc& function) const {
+    return function.m_numPerturbationIterations == 0 && is_exactly<btBoxShape>(shape());
+  }
+
+  void update_box(const btConvexConvexAlgorithm::CreateFunc& function, const LocalBox& near) {
+    const auto& box = static_cast<const btBoxShape&>(shape());
+    const btScalar margin = box.btBoxShape::getMargin();
+    const btVector3 half = box.getImplicitShapeDimensions() + btVector3(margin, margin, margin);
+    const BoxDetector detector(box, convex_.getWorldTransform(), concave_.getWorldTransform(),
+                               triangle_margin(), threshold());
+    for_each_close_triangle(
+        near,
+        [&](const btVector3& direction) {
+          return btVector3(btFsels(direction.x(), half.x(), -half.x()),
+                           btFsels(direction.y(), half.y(), -half.y()),
+                           btFsels(direction.z(), half.z(), -half.z()));
+        },
+        [&](const btVector3* triangle, int part, int index) {
+          if (!detector.add_contact(triangle, &result_)) run(function, triangle, part, index);
+        });
+  }
+  void update_convex(const btConvexConvexAlgorithm::CreateFunc& function, const LocalBox& near) {
+    for_each_close_triangle(
+        near,
+        [&](const btVector3& direction) { return shape().localGetSupportingVertex(direction); },
+        [&](const btVector3* triangle, int part, int index) {
+          run(function, triangle, part, index);
+        });
+  }
+
+  /// Calls visit() for the triangles that Bullet does not ignore.
+  template <class Support, class Visit>
+  void for_each_close_triangle(const LocalBox& near, const Support& support, const Visit& visit) {
+    const SeparationTest test(concave_.getWorldTransform(), convex_.getWorldTransform(),
+                              threshold());
+    for_each_triangle(*concave_.getCollisionShape(), near,
+                      [&](const btVector3* triangle, int part, int index) {
+                        if (dispatch_.ignores_separated && test.is_separated(triangle, support)) {
+                          return;
+                        }
+                        set_triangle(part, index);
+                        visit(triangle, part, index);
+                      });
+  }
+
+  /// Runs Bullet's algorithm for one triangle.
+  void run(const btConvexConvexAlgorithm::CreateFunc& function, const btVector3* triangle, int part,
+           int index) {
+    btTriangleShape triangle_shape(triangle[0], triangle[1], triangle[2]);
+    triangle_shape.setMargin(triangle_margin());
+    const btCollisionObjectWrapper wrapper(&concave_, &triangle_shape,
+                                           concave_.getCollisionObject(),
+                                           concave_.getWorldTransform(), part, index);
     const btCollisionAlgorithmConstructionInfo info(&dispatch_.dispatcher, 1);
-    btConvexConvexAlgorithm algorithm(&manifold_, info, &convex_, &concave_, function.m_pdSolver,
+    btConvexConvexAlgorithm algorithm(&manifold_, info, &convex_, &wrapper, function.m_pdSolver,
                                       function.m_numPerturbationIterations,
                                       function.m_minimumPointsPerturbationThreshold);
-    begin();
-    for_each_triangle(
-        *concave_.getCollisionShape(), box, [&](const btVector3* triangle, int part, int index) {
-          if (dispatch_.ignores_separated && test.is_separated(triangle, support)) return;
-          btTriangleShape triangle_shape(triangle[0], triangle[1], triangle[2]);
-          triangle_shape.setMargin(margin);
-          const btCollisionObjectWrapper wrapper(&concave_, &triangle_shape,
-                                                 concave_.getCollisionObject(), from, part, index);
-          set_triangle(part, index);
-          algorithm.processCollision(&convex_, &wrapper, dispatch_.info, &result_);
-        });
-    result_.refreshContactPoints();
+    algorithm.processCollision(&convex_, &wrapper, dispatch_.info, &result_);
   }
 
   const ConvexDispatch& dispatch_;

@@ -3,9 +3,9 @@
 
 #include <jfpx/config.hpp>
 
-#include <LinearMath/btTransform.h>
+#include "src/bullet/dispatch/core_distance.hpp"
 
-#include <cstdint>
+#include <LinearMath/btTransform.h>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -20,20 +20,10 @@ struct SphereBoxInput {
   btScalar maximum_distance_squared;
 };
 
-struct SphereBoxContact {
-  btVector3 normal_on_b;
-  btVector3 point_on_b;
-  btScalar distance;
-};
+using SphereBoxContact = DetectorContact;
+using SphereBoxResult = DetectorResult;
 
-enum class SphereBoxResult : std::uint8_t {
-  apart,
-  contact,
-  unknown,  ///< deep or degenerate: Bullet continues with its penetration depth solver
-};
-
-/// Reproduces btGjkPairDetector::getClosestPointsNonVirtual of Bullet 3.24, operation by operation,
-/// up to the call of the penetration depth solver.
+/// The closest points of the two shapes.
 SphereBoxResult find_closest_points(const SphereBoxInput& input, SphereBoxContact* contact);
 
 }  // namespace bullet
