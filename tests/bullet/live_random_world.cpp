@@ -7,6 +7,7 @@
 #include <BulletCollision/BroadphaseCollision/btSimpleBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btSimulationIslandManager.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 
 #include <cmath>
 
@@ -104,6 +105,9 @@ btCollisionShape* LiveWorld::make_shape(const RandomBody& body) {
       }
       return compound;
     }
+    case ShapeKind::mesh:
+    case ShapeKind::heights:
+      return live_.keep(make_terrain(body));
   }
   if ((body.traits & kSharesShape) != 0) {
     for (auto& [size, shape] : shared_spheres_) {
@@ -113,6 +117,56 @@ btCollisionShape* LiveWorld::make_shape(const RandomBody& body) {
     return shared_spheres_.back().second;
   }
   return live_.keep(new btSphereShape(s));
+}
+
+btCollisionShape* LiveWorld::make_terrain(const RandomBody& body) {
+  constexpr int kPoints = 9;
+  const btScalar cell = body.size;
+  const auto height = [&](int i) { return cell * btScalar(i * 37 % 11) / 20; };
+  if (body.shape == ShapeKind::heights) {
+    for (int i = 0; i < kPoints * kPoints; ++i) terrain_.points.push_back(height(i));
+    auto* heights =
+        new btHeightfieldTerrainShape(kPoints, kPoints, terrain_.points.data(), 1, 0, cell, 1,
+                                      sizeof(btScalar) == 8 ? PHY_DOUBLE : PHY_FLOAT, false);
+    heights->setLocalScaling(btVector3(cell, 1, cell));
+    return heights;
+  }
+  for (int i = 0; i < kPoints * kPoints; ++i) {
+    terrain_.points.insert(terrain_.points.end(),
+                           {cell * btScalar(i % kPoints - kPoints / 2), height(i) - cell / 4,
+                            cell * btScalar(i / kPoints - kPoints / 2)});
+  }
+  for (int row = 0; row + 1 < kPoints; ++row) {
+    for (int column = 0; column + 1 < kPoints; ++column) {
+      const int a = row * kPoints + column;
+      terrain_.indices.insert(terrain_.indices.end(),
+                              {a, a + kPoints, a + 1, a + 1, a + kPoints, a + kPoints + 1});
+    }
+  }
+  btIndexedMesh part;
+  part.m_numTriangles = static_cast<int>(terrain_.indices.size()) / 3;
+  part.m_triangleIndexBase = reinterpret_cast<const unsigned char*>(terrain_.indices.data());
+  part.m_triangleIndexStride = 3 * sizeof(int);
+  part.m_numVertices = kPoints * kPoints;
+  part.m_vertexBase = reinterpret_cast<const unsigned char*>(terrain_.points.data());
+  part.m_vertexStride = 3 * sizeof(btScalar);
+  terrain_.arrays.addIndexedMesh(part);
+  const btVector3 far(10 * cell, 10 * cell, 10 * cell);
+  return new btBvhTriangleMeshShape(&terrain_.arrays, true, -far, far);
+}
+
+void LiveWorld::deform(const RandomEvent& event) {
+  btRigidBody* body = bodies_[event.a];
+  const RandomBody& random = random_.bodies[event.a];
+  for (std::size_t k = 0; k < 8; ++k) {
+    const std::size_t point = (event.bits + 13 * k) % 81;
+    const btScalar height = random.size * btScalar(0.4) * event.x * btScalar(k % 2);
+    terrain_.points[random.shape == ShapeKind::mesh ? 3 * point + 1 : point] = height;
+  }
+  if (random.shape != ShapeKind::mesh) return;
+  const btScalar far = 10 * random.size;
+  static_cast<btBvhTriangleMeshShape*>(body->getCollisionShape())
+      ->refitTree(btVector3(-far, -far, -far), btVector3(far, far, far));
 }
 
 void LiveWorld::add_body(std::size_t i) {
@@ -215,7 +269,8 @@ void LiveWorld::leave(btRigidBody* body) {
 
 void LiveWorld::reshape(std::size_t i) {
   btRigidBody* body = bodies_[i];
-  if (random_.bodies[i].shape == ShapeKind::plane) return;
+  const ShapeKind kind = random_.bodies[i].shape;
+  if (kind == ShapeKind::plane || kind == ShapeKind::mesh || kind == ShapeKind::heights) return;
   // As Bullet requires, the pairs are cleaned when the type of a shape changes.
   if (body->isInWorld()) {
     live_.world.getPairCache()->cleanProxyFromPairs(body->getBroadphaseHandle(),
@@ -275,7 +330,15 @@ void LiveWorld::apply(const RandomEvent& event) {
       }
       break;
     case EventKind::scale:
-      a->getCollisionShape()->setLocalScaling(btVector3(event.x, -event.x, event.x));
+      if (random_.bodies[event.a].shape == ShapeKind::heights) {
+        const btScalar cell = random_.bodies[event.a].size * event.x;
+        a->getCollisionShape()->setLocalScaling(btVector3(cell, event.x, cell));
+      } else {
+        a->getCollisionShape()->setLocalScaling(btVector3(event.x, -event.x, event.x));
+      }
+      break;
+    case EventKind::deform:
+      deform(event);
       break;
     case EventKind::reshape:
       reshape(event.a);

@@ -27,6 +27,8 @@ class LiveWorld {
   std::unique_ptr<btCollisionConfiguration> make_configuration() const;
   std::unique_ptr<btBroadphaseInterface> make_broadphase();
   btCollisionShape* make_shape(const RandomBody& body);
+  btCollisionShape* make_terrain(const RandomBody& body);
+  void deform(const RandomEvent& event);  ///< of a terrain
   void add_body(std::size_t i);
   static void apply_traits(btRigidBody* made, const RandomBody& body);
   static void place(btRigidBody* body, const btVector3& position);
@@ -37,7 +39,15 @@ class LiveWorld {
   void leave(btRigidBody* body);  ///< takes it out of the world, with its joints
   void reshape(std::size_t i);    ///< changes between its own shape and a box
 
+  /// Arrays that the shape of a terrain refers to.
+  struct Terrain {
+    std::vector<btScalar> points;  ///< coordinates of a mesh, heights of a height field
+    std::vector<int> indices;
+    btTriangleIndexVertexArray arrays;
+  };
+
   const RandomWorld& random_;
+  Terrain terrain_;  // outlives the shapes
   btSortedOverlappingPairCache sorted_pairs_;
   BulletWorld live_;
   std::vector<btRigidBody*> bodies_;  ///< null where a body is not used

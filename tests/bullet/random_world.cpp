@@ -73,7 +73,7 @@ RandomBody random_body(auto& random, const RandomWorld& world, Real edge, bool o
 RandomEvent random_event(auto& random, const RandomWorld& world, Real edge) {
   RandomEvent event;
   event.step = static_cast<int>(random.below(static_cast<std::uint64_t>(world.steps)));
-  event.kind = static_cast<EventKind>(random.below(kEventKinds));
+  event.kind = static_cast<EventKind>(random.below(kEventKinds - 1));  // terrains have own events
   // Bullet's btCompoundCollisionAlgorithm::calculateTimeOfImpact reads a null shape.
   const bool compounds =
       std::any_of(world.bodies.begin(), world.bodies.end(),
@@ -85,6 +85,30 @@ RandomEvent random_event(auto& random, const RandomWorld& world, Real edge) {
   event.x = random.uniform(Real(0.5), Real(1.5));
   event.bits = static_cast<unsigned>(random.next() & random.next());
   return event;
+}
+
+/// A mesh or height field below the bodies, at rest or moving, and events that change it. The last
+/// draws, so that the inputs of the fuzzer keep their meaning.
+void add_terrain(auto& random, Real edge, RandomWorld* world) {
+  RandomBody terrain;
+  terrain.shape = chance(random, Real(0.5)) ? ShapeKind::mesh : ShapeKind::heights;
+  terrain.size = edge / 5;
+  terrain.position = {edge / 2, random.uniform(Real(-0.2), Real(0.3)) * edge, edge / 2};
+  terrain.mass = 0;
+  if (chance(random, Real(0.3))) {
+    terrain.traits |= kKinematic;
+    terrain.velocity = random.uniform_in_box({-1, -1, -1}, {1, 1, 1}) * world->scale;
+  }
+  if (chance(random, Real(0.2))) terrain.traits |= kCustomMaterial;
+  if (chance(random, Real(0.3))) terrain.traits |= kMargin;
+  terrain.friction = random.uniform(0, 2);
+  world->bodies.push_back(terrain);
+  for (std::uint64_t n = random.below(6); n > 0; --n) {
+    RandomEvent event = random_event(random, *world, edge);
+    event.a = world->bodies.size() - 1;
+    if (chance(random, Real(0.5))) event.kind = EventKind::deform;
+    world->events.push_back(event);
+  }
 }
 
 RandomWorld draw_world(auto& random) {
@@ -133,21 +157,23 @@ RandomWorld draw_world(auto& random) {
   for (std::uint64_t n = chance(random, Real(0.8)) ? random.below(25) : 0; n > 0; --n) {
     world.events.push_back(random_event(random, world, edge));
   }
+  if (chance(random, Real(0.2))) world.threads = 2;
+  if (chance(random, Real(0.25))) add_terrain(random, edge, &world);
   std::stable_sort(world.events.begin(), world.events.end(),
                    [](const RandomEvent& p, const RandomEvent& q) { return p.step < q.step; });
-  if (chance(random, Real(0.2))) world.threads = 2;
   return world;
 }
 
 const char* name_of(ShapeKind kind) {
-  constexpr const char* kNames[] = {"sphere", "box", "plane", "compound", "capsule"};
+  constexpr const char* kNames[] = {"sphere",  "box",  "plane",  "compound",
+                                    "capsule", "mesh", "heights"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 const char* name_of(EventKind kind) {
   constexpr const char* kNames[kEventKinds] = {
-      "teleport",   "toggle",     "radius", "scale",        "reshape",          "push",
-      "activation", "ignore",     "traits", "filter",       "gravity",          "callbacks",
-      "dispatch",   "continuous", "order",  "contact_test", "contact_pair_test"};
+      "teleport",   "toggle",     "radius", "scale",        "reshape",           "push",
+      "activation", "ignore",     "traits", "filter",       "gravity",           "callbacks",
+      "dispatch",   "continuous", "order",  "contact_test", "contact_pair_test", "deform"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 std::ostream& operator<<(std::ostream& out, const Vec3& v) {

@@ -15,7 +15,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
-enum class ShapeKind : std::uint8_t { sphere, box, plane, compound, capsule };
+enum class ShapeKind : std::uint8_t { sphere, box, plane, compound, capsule, mesh, heights };
 
 enum BodyTrait : unsigned {
   kKinematic = 1u << 0,       ///< moves by its velocity, which nothing changes
@@ -36,7 +36,7 @@ enum BodyTrait : unsigned {
 struct RandomBody {
   bool used = true;  ///< shrinking takes bodies out without renumbering the others
   ShapeKind shape = ShapeKind::sphere;
-  Real size = 1;  ///< radius, half side, half height: [m]
+  Real size = 1;  ///< radius, half side, half height, cell of a terrain: [m]
   Vec3 position, velocity, spin;
   Vec3 normal = {0, 1, 0};  ///< of a plane, before its body turns
   Real offset = 0;          ///< of a plane, along its normal: [m]
@@ -70,8 +70,9 @@ enum class EventKind : std::uint8_t {
   order,       ///< toggles m_deterministicOverlappingPairs
   contact_test,
   contact_pair_test,
+  deform,  ///< changes heights of a terrain and adapts its tree
 };
-inline constexpr std::uint64_t kEventKinds = 17;
+inline constexpr std::uint64_t kEventKinds = 18;
 
 struct RandomEvent {
   int step = 0;  ///< happens before this step
@@ -135,7 +136,7 @@ struct Failure {
 };
 struct RunTotals {
   std::uint64_t steps = 0, batches = 0, written = 0, touching = 0, convex_pairs = 0, verified = 0,
-                events = 0;
+                events = 0, sphere_concaves = 0, concave_pairs = 0;
 };
 
 /// Steps two worlds side by side, one of them with `ours`; compares all that first_difference()

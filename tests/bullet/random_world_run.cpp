@@ -48,6 +48,8 @@ void add_totals(const RandomWorld& world, LiveWorld& ours, RunTotals* totals) {
   totals->written += dispatcher->stats().written;
   totals->convex_pairs += dispatcher->stats().convex_pairs;
   totals->verified += dispatcher->stats().verified;
+  totals->sphere_concaves += dispatcher->stats().sphere_concaves;
+  totals->concave_pairs += dispatcher->stats().concave_pairs;
 }
 
 }  // namespace

@@ -37,6 +37,8 @@ TEST(RandomWorlds, MatchStockWorlds) {
   EXPECT_GT(totals.written, totals.steps / 4);
   EXPECT_GT(totals.convex_pairs, totals.steps / 20);
   EXPECT_GT(totals.verified, 0u);
+  EXPECT_GT(totals.sphere_concaves, totals.steps / 20);
+  EXPECT_GT(totals.concave_pairs, 0u);
   RecordProperty("steps", std::to_string(totals.steps));
 }
 

@@ -52,6 +52,11 @@ DispatchStats sum_of_stats(std::string_view* backend) {
     sum.sphere_boxes += stats.sphere_boxes;
     sum.sphere_planes += stats.sphere_planes;
     sum.convex_pairs += stats.convex_pairs;
+    sum.sphere_concaves += stats.sphere_concaves;
+    sum.concave_pairs += stats.concave_pairs;
+    for (std::size_t i = 0; i < kConcaveFallbackCount; ++i) {
+      sum.concave_fallbacks[i] += stats.concave_fallbacks[i];
+    }
     sum.verified += stats.verified;
     if (sum.mismatches == 0) sum.first_mismatch = stats.first_mismatch;
     sum.mismatches += stats.mismatches;
@@ -108,6 +113,12 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
     const std::string_view reason = to_string(static_cast<OrderReason>(i));
     std::fprintf(stderr, "%sbatches in Bullet's order: %llu (%.*s)\n", prefix,
                  Count{stats.ordered[i]}, static_cast<int>(reason.size()), reason.data());
+  }
+  for (std::size_t i = 1; i < kConcaveFallbackCount; ++i) {
+    if (stats.concave_fallbacks[i] == 0) continue;
+    const std::string_view reason = to_string(static_cast<ConcaveFallback>(i));
+    std::fprintf(stderr, "%spairs with concave shapes left to Bullet: %llu (%.*s)\n", prefix,
+                 Count{stats.concave_fallbacks[i]}, static_cast<int>(reason.size()), reason.data());
   }
   if (stats.verified > 0) {
     std::fprintf(stderr, "%sverified: %llu pairs, %llu mismatches%s%s\n", prefix,
