@@ -4,14 +4,14 @@
 /// which are the shapes without their margins, and the distance between them (G. van den Bergen,
 /// "A Fast and Robust GJK Implementation for Collision Detection of Convex Objects", 1999). The
 /// first part follows libccd's GJK, which Bullet uses, including the triangle distance in double
-/// and the fuzzy comparisons. The arithmetic uses Bullet's inline functions and simplex solver if
-/// possible.
+/// and the fuzzy comparisons. The arithmetic uses Bullet's inline functions.
 #pragma once
 
 #include <jfpx/config.hpp>
 #include <jfpx/math.hpp>
 
-#include <BulletCollision/NarrowPhaseCollision/btVoronoiSimplexSolver.h>
+#include "src/bullet/dispatch/voronoi_simplex.hpp"
+
 #include <LinearMath/btTransform.h>
 
 #include <cstdint>
@@ -282,11 +282,9 @@ bool cores_intersect(const Cores& cores, bool are_clear) {
 /// Bullet's distance iteration. Returns false if it ends without a valid simplex.
 template <class Cores>
 bool find_closest_simplex(const Cores& cores, btScalar maximum_distance_squared,
-                          btVoronoiSimplexSolver* simplex, btVector3* axis,
-                          btScalar* squared_distance) {
+                          VoronoiSimplex* simplex, btVector3* axis, btScalar* squared_distance) {
   *axis = btVector3(0, 1, 0);
   *squared_distance = BT_LARGE_FLOAT;
-  simplex->reset();
   for (int i = 0; i <= kMaxIterations; ++i) {
     btVector3 on_a, on_b;
     const btVector3 w = cores.support(-*axis, &on_a, &on_b);
@@ -294,11 +292,11 @@ bool find_closest_simplex(const Cores& cores, btScalar maximum_distance_squared,
     if (delta > btScalar(0) && delta * delta > *squared_distance * maximum_distance_squared) {
       return true;
     }
-    if (simplex->inSimplex(w)) return true;
+    if (simplex->contains(w)) return true;
     if (*squared_distance - delta <= *squared_distance * kRelativeError) return true;
-    simplex->addVertex(w, on_a, on_b);
+    simplex->add(w, on_a, on_b);
     btVector3 closest;
-    if (!simplex->closest(closest)) return true;
+    if (!simplex->find_closest(&closest)) return true;
     if (closest.length2() < kRelativeError) {
       *axis = closest;
       return true;
@@ -307,7 +305,7 @@ bool find_closest_simplex(const Cores& cores, btScalar maximum_distance_squared,
     *squared_distance = closest.length2();
     if (previous - *squared_distance <= SIMD_EPSILON * previous) return true;
     *axis = closest;
-    if (simplex->fullSimplex()) return false;
+    if (simplex->is_full()) return false;
   }
   return false;
 }
@@ -321,15 +319,14 @@ DetectorResult find_closest_points(const CoreA& a, const CoreB& b, const Detecto
                                    DetectorContact* contact) {
   const gjk::Cores<CoreA, CoreB> cores(a, b);
   if (gjk::cores_intersect(cores, input.are_clear)) return DetectorResult::unknown;
-  btVoronoiSimplexSolver simplex;
+  gjk::VoronoiSimplex simplex;
   btVector3 axis;
   btScalar squared_distance;
   if (!gjk::find_closest_simplex(cores, input.maximum_distance_squared, &simplex, &axis,
                                  &squared_distance)) {
     return DetectorResult::unknown;
   }
-  if (simplex.numVertices() == 0)
-    return DetectorResult::unknown;  // the distance exceeds BT_LARGE_FLOAT
+  if (simplex.is_empty()) return DetectorResult::unknown;  // the distance exceeds BT_LARGE_FLOAT
   const btScalar length2 = axis.length2();
   if (!(length2 > SIMD_EPSILON * SIMD_EPSILON)) return DetectorResult::unknown;
   const btScalar margin = input.margin_a + input.margin_b;
@@ -339,8 +336,7 @@ DetectorResult find_closest_points(const CoreA& a, const CoreB& b, const Detecto
   if (!(distance < 0 || distance * distance < input.maximum_distance_squared)) {
     return DetectorResult::apart;
   }
-  btVector3 on_a, on_b;
-  simplex.compute_points(on_a, on_b);
+  btVector3 on_b = simplex.closest_on_b();
   on_b += axis * (input.margin_b / btSqrt(squared_distance));
   btVector3 normal = axis;
   normal *= k;
