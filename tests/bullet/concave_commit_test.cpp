@@ -340,6 +340,23 @@ TEST(ConcaveCommit, ReadsShapesThatTheUserReplaces) {
   EXPECT_GT(count_of(twins, ConcaveFallback::concave_class), 0u);
 }
 
+TEST(ConcaveCommit, RunsBatchesWithoutSpheresOnOneThread) {
+  RandomTerrain stock(8), ours(8);
+  for (const int boxes : {20, 100}) {
+    Twins twins(concave_options(1));
+    twins.both([&](BulletWorld& w) {
+      w.add((&w == &twins.ours() ? ours : stock).shape(), btVector3(0, 0, 0), 0);
+      auto* box = w.keep(new btBoxShape(btVector3(btScalar(0.2), btScalar(0.3), btScalar(0.2))));
+      for (int i = 0; i < boxes; ++i) {
+        w.add(box, btVector3(btScalar(i % 10) - 5, btScalar(0.5), btScalar(i / 10) - 5));
+      }
+    });
+    ASSERT_TRUE(twins.step(5));
+    EXPECT_EQ(twins.stats().batches > 0, boxes == 100);
+    EXPECT_EQ(twins.stats().concave_pairs > 0, boxes == 100);
+  }
+}
+
 TEST(ConcaveFallbacks, HaveDifferentTexts) {
   std::vector<std::string> texts;
   for (std::size_t i = 0; i < kConcaveFallbackCount; ++i) {

@@ -16,7 +16,7 @@ namespace bullet {
 enum class Fallback : std::uint8_t {
   none,
   small_batch,      ///< fewer pairs than minimum_batch
-  no_spheres,       ///< fewer than two spheres among the bodies of the pairs, and one thread
+  no_spheres,       ///< fewer than two spheres, fewer than 64 pairs with concave shapes, one thread
   near_callback,    ///< the user has set a near callback
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE

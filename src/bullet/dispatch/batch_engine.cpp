@@ -61,6 +61,16 @@ bool has_stock_sphere_function(const btCollisionDispatcher& dispatcher) {
   return function != nullptr && is_exactly<btSphereSphereCollisionAlgorithm::CreateFunc>(*function);
 }
 
+/// Whether pairs with concave shapes are so many that a batch without spheres gains with one
+/// thread.
+bool has_many_concave_pairs(const SphereBatch& batch) {
+  std::size_t wanted = 64;
+  for (std::size_t i = 0; i < batch.pairs().size(); ++i) {
+    if (is_concave(batch.kind(i)) && --wanted == 0) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 BatchEngine::BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options)
@@ -97,8 +107,8 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
   try {
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
-    // Pairs of other shapes gain only from several threads.
-    if (spheres < 2 && pool_.threads() == 1) {
+    // Most pairs of other shapes gain only from several threads.
+    if (spheres < 2 && pool_.threads() == 1 && !has_many_concave_pairs(batch_)) {
       *fallback = Fallback::no_spheres;
       return false;
     }

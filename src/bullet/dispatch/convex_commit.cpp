@@ -52,10 +52,6 @@ bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
   return false;
 }
 
-bool is_concave(PairKind kind) {
-  return kind == PairKind::convex_concave || kind == PairKind::concave_convex;
-}
-
 /// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
 /// for other shapes and for contacts that need Bullet's algorithm.
 bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts) {

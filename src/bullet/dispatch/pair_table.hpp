@@ -37,6 +37,11 @@ enum class PairKind : std::uint8_t {
                    ///< first
 };
 
+/// Whether one shape of the pair is concave.
+inline bool is_concave(PairKind kind) {
+  return kind == PairKind::convex_concave || kind == PairKind::concave_convex;
+}
+
 /// The dispatcher that runs the dispatch. Its own algorithms may be cached; algorithms of other
 /// dispatchers are read in every refresh().
 struct PairOwner {
