@@ -132,11 +132,10 @@ class MeshVertices {
   template <class Index>
   void read_vertices(const Index* indices, btVector3* vertices) const {
     for (int k = 0; k < 3; ++k) {
-      const unsigned char* vertex =
+      const void* vertex =
           arrays_->m_vertexBase + static_cast<std::ptrdiff_t>(indices[k]) * arrays_->m_vertexStride;
-      vertices[k] = arrays_->m_vertexType == PHY_FLOAT
-                        ? scaled(reinterpret_cast<const float*>(vertex))
-                        : scaled(reinterpret_cast<const double*>(vertex));
+      vertices[k] = arrays_->m_vertexType == PHY_FLOAT ? scaled(static_cast<const float*>(vertex))
+                                                       : scaled(static_cast<const double*>(vertex));
     }
   }
   template <class Number>
