@@ -53,7 +53,7 @@ template <class S>
 JFPX_HD bool sweep_core(const CoreMotion& core, const S& shape, Real* t) {
   // At a grazing angle the last steps are short. The ball then stops before it touches.
   constexpr int kMostAdvances = 64;
-  constexpr Real kShare = Real(0.75), kTolerance = Real(1) / 64;
+  constexpr Real kShare = Real(15) / 16, kTolerance = Real(1) / 64;
   Separation s = point_separation(core.from, shape);
   if (!(s.distance > core.error)) return false;
   const Real closest = s.distance * kShare;

@@ -28,6 +28,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/snapshots/force_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/snapshots/joint_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/snapshots/snapshot_file.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/step/continuous_collision.cpp
   ${CMAKE_CURRENT_LIST_DIR}/step/soft_step.cpp
   ${CMAKE_CURRENT_LIST_DIR}/thesis_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world.cpp

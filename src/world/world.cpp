@@ -128,7 +128,7 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   const BegunCounts begun = count_begun_contacts(soft_step.contacts().view(), pool.get());
   report->contacts += begun.spheres + begun.points;
   report->sphere_contacts += begun.spheres;
-  soft_step.commit(&store, steps);
+  soft_step.commit(&store, steps, contact_finder.sub_shapes().view(), contact_finder.fixed_trees());
   joints.commit();
   report->integrate_ms = forces_ms;
   report->detect_ms = detect_ms;

@@ -25,7 +25,7 @@ void expect_first_touch(const detail::CoreMotion& core, const S& shape) {
     EXPECT_FALSE(touches && !(start > 0));
     return;
   }
-  const Real target = std::min(core.radius, start * 0.75_r);
+  const Real target = std::min(core.radius, start * 0.9375_r);
   if (touches) {
     EXPECT_NEAR(distance_at(t), target, target * 0.1_r);
   }

@@ -7,6 +7,7 @@
 #include "src/scene/compound.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
+#include "tests/world/chambers.hpp"
 #include "tests/world/equal_worlds.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
@@ -170,6 +171,29 @@ TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
   }
   EXPECT_GT(contacts, 1000u);
   EXPECT_TRUE(WorldAccess::impl(device).resident());
+}
+
+TEST_P(DeviceWorldTest, FastBodiesInRoomsHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  for (int k = 0; k < 4 * test::kRoomCount; ++k) {
+    const int room = k % test::kRoomCount;
+    Scene scene = test::throw_scene(&random, room).scene;
+    const bool is_turning = room > 1 && random.below(2) == 0;
+    if (is_turning) {
+      scene.bodies[0].kinematic = true;
+      scene.bodies[0].velocity = {1, 0.5_r, 0};
+      scene.bodies[0].angular_velocity = test::random_direction(&random) * 3;
+    }
+    World host = on_host(scene), device = on_device(scene);
+    for (int n = 0; n < 8; ++n) {
+      host.step();
+      device.step();
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << test::kRooms[room] << ", step " << n;
+    }
+    EXPECT_TRUE(WorldAccess::impl(device).resident());
+  }
 }
 
 TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {

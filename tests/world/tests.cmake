@@ -54,6 +54,7 @@ set_source_files_properties(world/portable_files_test.cpp PROPERTIES
   COMPILE_DEFINITIONS "JFPX_FILES=\"${CMAKE_CURRENT_SOURCE_DIR}/world/files/\"")
 jfpx_add_test(quality_test THESIS SOURCES
   world/box_rest_test.cpp
+  world/continuous_collision_test.cpp
   world/mesh_world_test.cpp
   world/equilibrium_test.cpp
   world/free_rotation_test.cpp

@@ -45,6 +45,8 @@ class ContactFinder {
                                         soft_step::ContactSet* set, DetectedContacts* detected);
 
   SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
+  /// The trees of the last search.
+  FixedTreesView fixed_trees() const noexcept { return fixed_trees_.view(); }
   BroadPhaseSearch& broad_phase() noexcept { return *broad_phase_; }
   const SphereCollider& collider() const noexcept { return broad_phase_->collider(); }
 

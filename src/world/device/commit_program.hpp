@@ -5,13 +5,14 @@
 #include "src/world/bodies/partition.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/device/step_data.hpp"
+#include "src/world/step/continuous_collision.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Ends the step: moves the bodies, clears forces, and puts islands to sleep. If the step cannot be
-/// completed or a body has left the world, it only counts the step.
+/// Ends the step: stops bodies at walls, moves the bodies, clears forces, and puts islands to
+/// sleep. If the step cannot be completed or a body has left the world, it only counts the step.
 struct CommitProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kCommit;
   StepData data;
@@ -27,6 +28,9 @@ struct CommitProgram {
     const Progress& progress = d.counters->progress;
     const std::uint64_t steps = progress.offset + progress.completed;  // before complete()
     const soft_step::ContactView contacts = d.contacts();  // before complete() changes the parity
+    ContinuousCollision{d.step, d.swept_bounds.sub_shapes, d.trees}.run(
+        team, bodies.count, [&](std::uint32_t i) { return bodies.ids[i].index; },
+        &d.counters->any_fast);
     Vec3* const position_before = d.now().position_before;
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;

@@ -90,7 +90,9 @@ struct StepCounters {
   std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
   std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
   std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
-  std::uint64_t largest_coordinate = 0;                 ///< partition::magnitude_of()
+  std::uint32_t any_fast = 0;            ///< 1: ContinuousCollision::is_fast() of a sub-shape
+  std::uint32_t unused = 0;              ///< instead of padding
+  std::uint64_t largest_coordinate = 0;  ///< partition::magnitude_of()
 
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set

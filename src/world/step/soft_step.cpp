@@ -228,7 +228,9 @@ void SoftStep::run_substeps(const BodyStore& bodies) {
   if (solver_.needs_restitution()) solver_.sweep(Sweep::restitution);
 }
 
-void SoftStep::commit(BodyStore* bodies, std::uint64_t steps) noexcept {
+void SoftStep::commit(BodyStore* bodies, std::uint64_t steps, const SubShapeView& sub_shapes,
+                      const FixedTreesView& trees) noexcept {
+  stop_fast_bodies(*bodies, sub_shapes, trees);
   const bool any_rests = any_body(*bodies, [this](std::uint32_t i) { return step_.store(i); });
   if (any_rests) islands_of(*bodies).put_to_sleep(PoolTeam(pool_));
   cache_.commit();

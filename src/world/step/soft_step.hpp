@@ -8,6 +8,7 @@
 #include "src/contact_solver/soft_step/cpu/soft_step_solver.hpp"
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/bodies/partition.hpp"
+#include "src/world/contacts/swept_bounds.hpp"
 #include "src/world/step/islands.hpp"
 #include "src/world/step/soft_step_stages.hpp"
 
@@ -44,8 +45,11 @@ class SoftStep {
   /// @param joints its arrays are valid until commit(); `now` receives their impulses
   std::optional<BodyId> solve(BodyStore* bodies, const soft_step::JointView& joints);
   /// Moves the bodies, clears forces, puts islands to sleep, and renews the partition into blocks
-  /// if it is due. @param steps World::steps() before the step
-  void commit(BodyStore* bodies, std::uint64_t steps) noexcept;
+  /// if it is due.
+  /// @param steps World::steps() before the step
+  /// @param sub_shapes,trees those of the contact search of the step
+  void commit(BodyStore* bodies, std::uint64_t steps, const SubShapeView& sub_shapes,
+              const FixedTreesView& trees) noexcept;
   /// Reserves memory for bodies with indices below `bodies`. @throws std::bad_alloc
   void reserve(std::size_t bodies) { cache_.reserve(bodies); }
   /// Replaces the parameters of the constructor and the contacts of the last completed step.
@@ -75,6 +79,8 @@ class SoftStep {
   bool any_body(const BodyStore& bodies, const Test& test);
   void load(const BodyStore& bodies);
   std::optional<BodyId> find_runaway(const BodyStore& bodies);
+  void stop_fast_bodies(const BodyStore& bodies, const SubShapeView& sub_shapes,
+                        const FixedTreesView& trees);
 
   soft_step::StepConstants constants_;
   SoftStepSettings settings_;
