@@ -10,6 +10,10 @@
 #include "src/scene/scene_fields.hpp"
 #include "src/world/forces/force_fields.hpp"
 
+#include <algorithm>
+#include <type_traits>
+#include <vector>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 
@@ -42,11 +46,24 @@ requires HasFields<T>
 void serialize(auto& archive, T& value) {
   each_field(value, [&](const auto&, auto& member) { archive(member); });
 }
+/// The vertices of a hull have one order, so that a snapshot is that of the world that it restores.
+inline void require_order(const Hull& hull, const std::vector<Vec3>& vertices) {
+  BinaryReader::require(std::ranges::equal(hull.vertices(), vertices),
+                        "the vertices of a hull are not in their order");
+}
 template <class T>
 requires HasFields<T>
 void serialize(BinaryReader& reader, T& value) {
   try {
-    each_field(value, [&](const auto&, auto& member) { reader(member); });
+    [[maybe_unused]] std::vector<Vec3> vertices;
+    each_field(value, [&](const auto&, auto& member) {
+      reader(member);
+      if constexpr (std::is_same_v<T, Hull> &&
+                    std::is_same_v<std::remove_reference_t<decltype(member)>, std::vector<Vec3>>) {
+        vertices = member;
+      }
+    });
+    if constexpr (std::is_same_v<T, Hull>) require_order(value, vertices);
   } catch (const InvalidArgument& error) {  // by the constructor of a shape
     BinaryReader::fail(error.what());
   }
