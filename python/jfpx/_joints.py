@@ -61,8 +61,41 @@ class JointState(NamedTuple):
     speed: float
 
 
+Rotation = tuple[float, float, float, float]
+_IDENTITY: Rotation = (1.0, 0.0, 0.0, 0.0)
+
+
+class _Joint:
+    """What all joints have in common. Their fields have the order of the engine."""
+
+    def _values(self) -> tuple[Any, ...]:
+        values: list[Any] = []
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if field.name == "a":
+                values.append(_arrays.body(value, "a"))
+            elif field.name == "b":
+                values.append(_optional(value))
+            elif field.name.startswith("anchor_"):
+                values.append(_arrays.triple(value, field.name))
+            elif field.name.startswith("axes_"):
+                values.append(_arrays.triple(value, field.name, 4))
+            elif field.name == "collide_connected":
+                values.append(bool(value))
+            elif field.name == "user_data":
+                values.append(_arrays.count(value, field.name, 0, 2**64 - 1))
+            else:
+                values.extend(_numbers(self, field.name))
+        return tuple(values)
+
+    @classmethod
+    def _of(cls, values: tuple[Any, ...]) -> Any:
+        a, b, *others = values
+        return cls(BodyId(*a), None if b is None else BodyId(*b), *others)  # type: ignore[call-arg]
+
+
 @dataclass(frozen=True)
-class DistanceJoint:
+class DistanceJoint(_Joint):
     """Keeps the distance of two points of two bodies in a range: a rod, if both lengths are equal;
     a rope, if min_length is 0. Between the limits, a spring may act. World.add_joint() checks the
     fields, and raises InvalidArgument.
@@ -92,55 +125,9 @@ class DistanceJoint:
 
     _name = "distance"
 
-    def _values(self) -> tuple[Any, ...]:
-        return (_arrays.body(self.a, "a"), _optional(self.b),
-                _arrays.triple(self.anchor_a, "anchor_a"), _arrays.triple(self.anchor_b, "anchor_b"),
-                *_numbers(self, "min_length", "max_length", "rest_length", "hertz",
-                          "damping_ratio"),
-                bool(self.collide_connected),
-                _arrays.count(self.user_data, "user_data", 0, 2**64 - 1))
-
-    @classmethod
-    def _of(cls, values: tuple[Any, ...]) -> DistanceJoint:
-        a, b, *others = values
-        return cls(BodyId(*a), None if b is None else BodyId(*b), *others)
-
-
-Rotation = tuple[float, float, float, float]
-_IDENTITY: Rotation = (1.0, 0.0, 0.0, 0.0)
-
-
-class _FrameJoint:
-    """What joints with axes have in common: the order of their fields is that of the engine."""
-
-    def _values(self) -> tuple[Any, ...]:
-        values: list[Any] = []
-        for field in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, field.name)
-            if field.name == "a":
-                values.append(_arrays.body(value, "a"))
-            elif field.name == "b":
-                values.append(_optional(value))
-            elif field.name.startswith("anchor_"):
-                values.append(_arrays.triple(value, field.name))
-            elif field.name.startswith("axes_"):
-                values.append(_arrays.triple(value, field.name, 4))
-            elif field.name == "collide_connected":
-                values.append(bool(value))
-            elif field.name == "user_data":
-                values.append(_arrays.count(value, field.name, 0, 2**64 - 1))
-            else:
-                values.extend(_numbers(self, field.name))
-        return tuple(values)
-
-    @classmethod
-    def _of(cls, values: tuple[Any, ...]) -> Any:
-        a, b, *others = values
-        return cls(BodyId(*a), None if b is None else BodyId(*b), *others)  # type: ignore[call-arg]
-
 
 @dataclass(frozen=True)
-class BallJoint(_FrameJoint):
+class BallJoint(_Joint):
     """Holds two points of two bodies together: three rotations stay free.
 
     a, b, anchor_a, anchor_b, collide_connected, user_data : as in DistanceJoint
@@ -173,7 +160,7 @@ class BallJoint(_FrameJoint):
 
 
 @dataclass(frozen=True)
-class HingeJoint(_FrameJoint):
+class HingeJoint(_Joint):
     """Lets body a rotate relative to b about the x axis of the joint only.
 
     min_angle, max_angle : [rad] from -pi to pi, of a about x; both: free,
@@ -205,7 +192,7 @@ class HingeJoint(_FrameJoint):
 
 
 @dataclass(frozen=True)
-class SliderJoint(_FrameJoint):
+class SliderJoint(_Joint):
     """Lets body a move relative to b along the x axis of the joint only, without rotation.
 
     min_position, max_position : [m] from -1e9 to 1e9, of a's anchor along x
@@ -236,7 +223,7 @@ class SliderJoint(_FrameJoint):
 
 
 @dataclass(frozen=True)
-class FixedJoint(_FrameJoint):
+class FixedJoint(_Joint):
     """Keeps two bodies in the relative pose in which their joint frames coincide.
 
     linear_hertz, angular_hertz : [Hz] from 0 to 1e6, of springs that hold points and axes; 0: rigid
@@ -260,7 +247,7 @@ class FixedJoint(_FrameJoint):
 
 
 @dataclass(frozen=True)
-class WheelJoint(_FrameJoint):
+class WheelJoint(_Joint):
     """A wheel a on a vehicle b: rotates about the x axis of the joint, and moves along its y axis,
     the direction of the suspension.
 
