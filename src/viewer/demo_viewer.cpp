@@ -7,6 +7,7 @@
 #include "src/viewer/exchangeable_collider.hpp"
 #include "src/viewer/forces.hpp"
 #include "src/viewer/run_state.hpp"
+#include "src/viewer/shapes.hpp"
 #include "src/viewer/widgets.hpp"
 
 #include <fmt/format.h>
