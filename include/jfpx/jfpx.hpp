@@ -9,6 +9,7 @@
 #include <jfpx/cost_model.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
+#include <jfpx/heightfield.hpp>
 #include <jfpx/hull.hpp>
 #include <jfpx/joint.hpp>
 #include <jfpx/material.hpp>

@@ -2,6 +2,7 @@
 /// documented otherwise.
 #pragma once
 
+#include <jfpx/heightfield.hpp>
 #include <jfpx/hull.hpp>
 #include <jfpx/math.hpp>
 #include <jfpx/triangle_mesh.hpp>
@@ -73,7 +74,8 @@ struct Compound {
 /// @param compound each part must be in the ranges that validate() requires
 JFPX_API Compound centred(Compound compound);
 
-using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh, Hull>;
+using Shape =
+    std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh, Hull, Heightfield>;
 
 /// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

@@ -62,6 +62,28 @@ void bind_scene(nb::module_& module) {
              return std::tuple(report.degenerate, report.duplicate, report.open_edges,
                                report.shared_edges, report.flipped_edges);
            })
+      .def("add_heightfield",
+           [](Scene& self, const Scene& body, const Rows<const Real>& heights, double spacing_x,
+              double spacing_z, const std::vector<std::uint32_t>& holes, bool two_sided) {
+             HeightfieldDef def{static_cast<std::uint32_t>(heights.shape(1)),
+                                static_cast<std::uint32_t>(heights.shape(0)),
+                                static_cast<Real>(spacing_x),
+                                static_cast<Real>(spacing_z),
+                                {},
+                                holes,
+                                two_sided};
+             def.heights.reserve(heights.size());
+             for (std::size_t i = 0; i < heights.shape(0); ++i) {
+               for (std::size_t k = 0; k < heights.shape(1); ++k) {
+                 def.heights.push_back(heights(i, k));
+               }
+             }
+             Scene grown = self;
+             grown.bodies.push_back(body.bodies.at(0));
+             grown.bodies.back().shape = Heightfield(std::move(def));
+             validate(grown);
+             self = std::move(grown);
+           })
       .def_prop_ro("name", [](const Scene& self) { return self.name; })
       .def_prop_ro("dt", [](const Scene& self) { return static_cast<double>(self.dt); })
       .def_prop_ro("bodies", [](const Scene& self) { return self.bodies.size(); })

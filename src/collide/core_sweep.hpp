@@ -89,7 +89,7 @@ JFPX_HD void sweep_core_to_mesh(const CoreMotion& core, const MeshView& mesh, co
     const Vec3 a = add_scaled(core.from, core.motion, Real(part) / Real(parts));
     const Vec3 b = add_scaled(core.from, core.motion, end);
     const Aabb box = merged({a - half, a + half}, {b - half, b + half});
-    mesh.tree.visit_overlapping(box, [&](std::uint32_t index) {
+    mesh.visit_overlapping(box, [&](std::uint32_t index) {
       TriangleInstance triangle;
       if (!make_instance(mesh, index, {}, core.from, &triangle)) return;
       Real t = 0;

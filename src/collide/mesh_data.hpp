@@ -27,6 +27,7 @@ struct MeshData {
             .first_neighbor = first_neighbor.data(),
             .neighbors = neighbors.data(),
             .tree = tree.view(),
+            .grid = {},
             .vertex_count = static_cast<std::uint32_t>(def.vertices.size()),
             .triangle_count = static_cast<std::uint32_t>(triangles.size()),
             .neighbor_count = static_cast<std::uint32_t>(neighbors.size()),

@@ -1,4 +1,4 @@
-/// Rays and overlaps with triangle meshes.
+/// Rays and overlaps with triangle meshes and heightfields.
 #pragma once
 
 #include "src/collide/box_pair.hpp"
@@ -34,11 +34,12 @@ class MeshRay {
 
   /// [m], distance of the hit; negative if there is none.
   Real hit(const MeshView& mesh, std::uint32_t index) const {
-    const MeshTriangle& triangle = mesh.triangles[index];
-    if (mesh.two_sided == 0 && !(dot(triangle.normal, direction_) < 0)) return -1;
+    Vec3 corners[3];
+    mesh.get_corners(index, corners);
+    if (mesh.two_sided == 0 && !(dot(mesh.normal(index, corners), direction_) < 0)) return -1;
     Vec3 x, y, z;
     for (int k = 0; k < 3; ++k) {
-      const Vec3 corner = mesh.vertices[triangle.vertices[k]] - origin_;
+      const Vec3 corner = corners[k] - origin_;
       x[k] = corner[across_] - shear_across_ * corner[along_];
       y[k] = corner[up_] - shear_up_ * corner[along_];
       z[k] = corner[along_] * scale_;
@@ -84,10 +85,72 @@ class MeshRay {
   Real scale_ = 0, shear_across_ = 0, shear_up_ = 0;
 };
 
+/// [m], the largest coordinate difference between a point and the corners of a tile.
+inline Real distance_to_corners(const GridView& grid, std::uint32_t tile, const Vec3& p) {
+  const Aabb box = grid.bounds_of_tile(tile);
+  Real most = 0;
+  for (int i = 0; i < 3; ++i) {
+    most = std::max({most, absolute(box.lower[i] - p[i]), absolute(box.upper[i] - p[i])});
+  }
+  return most;
+}
+
+/// Calls limit = visit(triangle) for each triangle of a tile that a ray may hit at a distance of at
+/// most the current limit [m]. Conservative, with the margin of TreeTraversal.
+template <class Visit>
+Real visit_tile_along(const GridView& grid, std::uint32_t tile, const Vec3& origin,
+                      const Vec3& direction, Real limit, const Visit& visit) {
+  const GridView::CellRange columns = grid.columns_of_tile(tile), rows = grid.rows_of_tile(tile);
+  const Real size = distance_to_corners(grid, tile, origin);
+  const Real margin = size * (256 * kEpsilon) + kLostLength;
+  // The ray is beyond the tile. The lower limit keeps the distance finite.
+  const Real far = 2 * (size + margin) /
+                   std::max({absolute(direction.x), absolute(direction.z), kEpsilon * kEpsilon});
+  for (std::uint32_t row = rows.begin; row < rows.end; ++row) {
+    // The part of the ray above the row, and its interval along x.
+    Real enters = 0, leaves = std::min(limit, far);
+    const Real near_z = grid.place_z(row) - margin - origin.z;
+    const Real far_z = grid.place_z(row + 1) + margin - origin.z;
+    if (absolute(direction.z) * far > margin) {
+      const Real p = near_z / direction.z, q = far_z / direction.z;
+      enters = std::max(enters, std::min(p, q));
+      leaves = std::min(leaves, std::max(p, q));
+    } else if (near_z > margin || far_z < -margin) {
+      continue;
+    }
+    if (!(enters <= leaves)) continue;
+    const Real x = origin.x + direction.x * enters, end = origin.x + direction.x * leaves;
+    const GridView::CellRange cells = grid.cells_between(
+        std::min(x, end) - margin, std::max(x, end) + margin, grid.columns, grid.spacing_x);
+    const std::uint32_t last = std::min(cells.end, columns.end);
+    for (std::uint32_t i = std::max(cells.begin, columns.begin); i < last; ++i) {
+      const std::uint32_t first = 2 * (row * grid.columns + i);
+      for (std::uint32_t k = 0; k < 2; ++k) {
+        if (grid.has_triangle(first + k)) limit = visit(first + k);
+      }
+    }
+  }
+  return limit;
+}
+
+/// Calls limit = visit(triangle) for each triangle that a ray may hit at a distance of at most the
+/// current limit [m].
+template <class Visit>
+void visit_triangles_along(const MeshView& mesh, const Vec3& origin, const Vec3& direction,
+                           Real limit, const Visit& visit) {
+  if (!mesh.is_grid()) {
+    TreeTraversal::visit_along(mesh.tree, origin, direction, limit, visit);
+    return;
+  }
+  TreeTraversal::visit_along(mesh.tree, origin, direction, limit, [&](std::uint32_t tile) {
+    return limit = visit_tile_along(mesh.grid, tile, origin, direction, limit, visit);
+  });
+}
+
 /// The first hit of a ray up to a distance. A one-sided triangle is hit from its front only. The
 /// normal points to the side from which the ray comes. Of triangles at the same distance, the one
 /// with the lowest number is hit.
-inline RayEntry enter(const Vec3& origin, const Vec3& direction, const TriangleMesh& mesh,
+inline RayEntry enter(const Vec3& origin, const Vec3& direction, const Mesh auto& mesh,
                       const Transform& pose, Real max_distance) {
   const MeshView view = view_of(mesh);
   const Vec3 from = inverse_transform_point(pose, origin);
@@ -95,7 +158,7 @@ inline RayEntry enter(const Vec3& origin, const Vec3& direction, const TriangleM
   const MeshRay ray(from, along);
   RayEntry first;
   std::uint32_t triangle = 0;
-  TreeTraversal::visit_along(view.tree, from, along, max_distance, [&](std::uint32_t index) {
+  visit_triangles_along(view, from, along, max_distance, [&](std::uint32_t index) {
     const Real distance = ray.hit(view, index);
     const bool is_hit = distance >= 0 && distance <= max_distance;
     if (is_hit && (!first.hit || distance < first.distance ||
@@ -107,7 +170,9 @@ inline RayEntry enter(const Vec3& origin, const Vec3& direction, const TriangleM
     return first.hit ? first.distance : max_distance;
   });
   if (!first.hit) return first;
-  const Vec3 normal = view.triangles[triangle].normal;
+  Vec3 corners[3];
+  view.get_corners(triangle, corners);
+  const Vec3 normal = view.normal(triangle, corners);
   first.normal = pose.basis * (dot(normal, along) > 0 ? -normal : normal);
   return first;
 }
@@ -124,7 +189,19 @@ void visit_triangles_around(const MeshView& mesh, const Transform& pose, const V
   const Vec3 half{projected_half_length(half_extents, to_mesh.row[0]) + error,
                   projected_half_length(half_extents, to_mesh.row[1]) + error,
                   projected_half_length(half_extents, to_mesh.row[2]) + error};
-  TreeTraversal::visit_around(mesh.tree, inverse_transform_point(pose, centre), half, visit);
+  const Vec3 middle = inverse_transform_point(pose, centre);
+  if (!mesh.is_grid()) {
+    TreeTraversal::visit_around(mesh.tree, middle, half, visit);
+    return;
+  }
+  const Real reach = std::max({half.x, half.y, half.z});
+  TreeTraversal::visit_around(mesh.tree, middle, half, [&](std::uint32_t tile) {
+    const GridView& grid = mesh.grid;
+    const Real size = distance_to_corners(grid, tile, middle) + reach;
+    const Real margin = size * TreeTraversal::kOverlapMargin + kLostLength;
+    const Vec3 r = half + Vec3{margin, margin, margin};
+    grid.visit_overlapping_in(tile, {middle - r, middle + r}, visit);
+  });
 }
 
 }  // namespace detail

@@ -27,7 +27,7 @@ JFPX_HD constexpr int next_corner(int i) { return i == 2 ? 0 : i + 1; }
 /// A triangle relative to a solid.
 struct TriangleInstance {
   const MeshView* mesh = nullptr;
-  const MeshTriangle* triangle = nullptr;
+  std::uint32_t triangle = 0;
   Mat3 basis;      ///< axes of the mesh
   Vec3 corner[3];  ///< [m], world axes, from the centre of the solid at the start of the step
   Vec3 normal;     ///< unit, world axes, of the side on which the solid is
@@ -35,17 +35,15 @@ struct TriangleInstance {
   /// Calls visit(n) with the unit normals, in world axes, of the neighbors at convex edges.
   template <class Visit>
   JFPX_HD void visit_convex_neighbors(const Visit& visit) const {
-    const Vec3* const at = mesh->vertices;
     const Vec3 local = transform_transpose(basis, normal);
+    const std::uint32_t flat_edges = mesh->flat_edges(triangle);
     for (int k = 0; k < 3; ++k) {
-      if (triangle->opposite[k] == kNoVertex || triangle->is_flat(static_cast<std::uint32_t>(k))) {
-        continue;
-      }
-      const Vec3& start = at[triangle->vertices[k]];
-      const Vec3 across = at[triangle->opposite[k]] - start;
+      const std::uint32_t opposite = mesh->opposite(triangle, k);
+      if (opposite == kNoVertex || (flat_edges >> k & 1) != 0) continue;
+      const Vec3 start = position(k), across = mesh->position(opposite) - start;
       if (!(dot(local, across) < 0)) continue;
-      const Vec3 along = at[triangle->vertices[next_corner(k)]] - start;
-      const Vec3 own = at[triangle->vertices[next_corner(next_corner(k))]] - start;
+      const Vec3 along = position(next_corner(k)) - start;
+      const Vec3 own = position(next_corner(next_corner(k))) - start;
       const Vec3 n = normalized(cross(across, along));
       visit(basis * (dot(local, cross(along, own)) < 0 ? -n : n));
     }
@@ -56,21 +54,18 @@ struct TriangleInstance {
   JFPX_HD bool is_proximal(int feature, const Vec3& n) const {
     if (feature == kFace) return true;
     const Vec3 local = transform_transpose(basis, n);
-    const Vec3* const at = mesh->vertices;
     if (feature >= kVertex) {
-      const std::uint32_t vertex = triangle->vertices[feature - kVertex];
-      const std::uint32_t end = mesh->first_neighbor[vertex + 1];
-      for (std::uint32_t k = mesh->first_neighbor[vertex]; k < end; ++k) {
-        if (!points_away(local, at[mesh->neighbors[k]] - at[vertex])) return false;
-      }
-      return true;
+      const std::uint32_t vertex = mesh->vertex(triangle, feature - kVertex);
+      const Vec3 at = mesh->position(vertex);
+      return mesh->all_neighbors(vertex, [&](std::uint32_t neighbor) {
+        return points_away(local, mesh->position(neighbor) - at);
+      });
     }
     const int edge = feature - kEdge;
-    const std::uint32_t opposite = triangle->opposite[edge];
+    const std::uint32_t opposite = mesh->opposite(triangle, edge);
     if (opposite == kNoVertex) return true;
-    const Vec3& start = at[triangle->vertices[edge]];
-    const Vec3 along = at[triangle->vertices[next_corner(edge)]] - start;
-    const Vec3 across = at[opposite] - start;
+    const Vec3 start = position(edge), along = position(next_corner(edge)) - start;
+    const Vec3 across = mesh->position(opposite) - start;
     return points_away(local,
                        add_scaled(across, along, -(dot(across, along) / length_squared(along))));
   }
@@ -83,6 +78,8 @@ struct TriangleInstance {
     const Real along = dot(n, into);
     return !(along > 0) || along * along <= kSine * kSine * length_squared(into);
   }
+  /// [m], of a corner in the axes of the mesh
+  JFPX_HD Vec3 position(int k) const { return mesh->position(mesh->vertex(triangle, k)); }
 };
 
 /// @param centre [m], of the solid
@@ -92,13 +89,13 @@ JFPX_HD inline bool make_instance(const MeshView& mesh, std::uint32_t triangle,
                                   const Transform& pose, const Vec3& centre,
                                   TriangleInstance* result) {
   result->mesh = &mesh;
-  result->triangle = &mesh.triangles[triangle];
+  result->triangle = triangle;
   result->basis = pose.basis;
   const Vec3 offset = pose.origin - centre;
-  for (int k = 0; k < 3; ++k) {
-    result->corner[k] = pose.basis * mesh.vertices[result->triangle->vertices[k]] + offset;
-  }
-  result->normal = pose.basis * result->triangle->normal;
+  Vec3 corner[3];
+  mesh.get_corners(triangle, corner);
+  for (int k = 0; k < 3; ++k) result->corner[k] = pose.basis * corner[k] + offset;
+  result->normal = pose.basis * mesh.normal(triangle, corner);
   if (dot(result->normal, result->corner[0]) > 0) {
     if (mesh.two_sided == 0) return false;
     result->normal = -result->normal;

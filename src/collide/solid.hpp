@@ -77,7 +77,7 @@ inline constexpr bool kIsSolid = kSolidKind<S> < SolidKinds::kCount;
 
 /// Whether S is a surface of triangles, whose bodies have mass 0.
 template <class S>
-inline constexpr bool kIsMesh = std::is_same_v<S, TriangleMesh>;
+inline constexpr bool kIsMesh = std::is_same_v<S, TriangleMesh> || std::is_same_v<S, Heightfield>;
 /// Whether S is infinite and ignores the pose of its body.
 template <class S>
 inline constexpr bool kIsWall = std::is_same_v<S, HalfSpace> || std::is_same_v<S, Plane>;

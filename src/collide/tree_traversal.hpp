@@ -22,6 +22,9 @@ inline namespace JFPX_ABI {
 /// D of a node, and therefore its margin, is at least that of its children.
 class TreeTraversal {
  public:
+  /// [-], of boxes, relative to D + R
+  static constexpr Real kOverlapMargin = sizeof(Real) == 4 ? Real(0x1p-7) : Real(0x1p-21);
+
   /// Calls limit = visit(item) for each item that a ray may hit at a distance of at most the
   /// current limit [m].
   /// @param direction unit
@@ -92,7 +95,6 @@ class TreeTraversal {
   /// Overlap of a box with each lane, with the margin of the comment above.
   struct OverlapTest {
     void operator()(const TreeBlock& block, Real, Lanes& entry, Lanes& exit) const {
-      constexpr Real kMargin = sizeof(Real) == 4 ? Real(0x1p-7) : Real(0x1p-21);
       const Real reach = std::max({half_extents.x, half_extents.y, half_extents.z});
       Lanes size, gap;
       size.fill(reach);
@@ -108,7 +110,7 @@ class TreeTraversal {
       }
       exit.fill(0);
       for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-        entry[lane] = gap[lane] - (size[lane] * kMargin + detail::kLostLength);
+        entry[lane] = gap[lane] - (size[lane] * kOverlapMargin + detail::kLostLength);
       }
     }
 

@@ -28,7 +28,7 @@ struct LocalTriangle {
   JFPX_HD void place(const Mat3& axes, const TriangleInstance& triangle, const Vec3& shift,
                      const Vec3& centre, Real radius) {
     normal = transform_transpose(axes, triangle.normal);
-    flat_edges = triangle.triangle->flat_edges;
+    flat_edges = triangle.mesh->flat_edges(triangle.triangle);
     Real farthest = 0;
     for (int k = 0; k < 3; ++k) {
       corner[k] = transform_transpose(axes, triangle.corner[k] - shift) + centre;

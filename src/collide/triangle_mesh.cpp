@@ -4,6 +4,7 @@
 #include <jfpx/triangle_mesh.hpp>
 
 #include "src/collide/mesh_data.hpp"
+#include "src/collide/triangle_normal.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,25 +25,6 @@ using detail::MeshTriangle;
 
 /// The ends of their edges have numbers of 32 bits.
 constexpr std::size_t kMostTriangles = std::size_t{1} << 29;
-/// Sine of the largest angle between triangles that are in the same plane. The surface of a box of
-/// 1 m is then at most 0.25 mm above an edge on which it has no point.
-constexpr double kFlatSine = 1e-3;
-/// A triangle whose height is at most this fraction of its longest edge has no area.
-constexpr double kLeastHeight = 16.0 * static_cast<double>(kEpsilon);
-
-/// A vector in double precision, in which differences and products of floats are exact or nearly
-/// so.
-struct Vec3d {
-  double x, y, z;
-};
-Vec3d difference(const Vec3& a, const Vec3& b) {
-  const auto d = [](Real p, Real q) { return static_cast<double>(p) - static_cast<double>(q); };
-  return {d(a.x, b.x), d(a.y, b.y), d(a.z, b.z)};
-}
-double dot(const Vec3d& a, const Vec3d& b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
-Vec3d cross(const Vec3d& a, const Vec3d& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 void check(const TriangleMeshDef& def) {
   if (def.triangles.size() > kMostTriangles || def.vertices.size() >= kNoVertex) {
@@ -90,16 +72,10 @@ std::vector<std::uint32_t> joined_vertices(const std::vector<Vec3>& vertices) {
 bool set_triangle(const std::vector<Vec3>& vertices, const Triangle& corners,
                   const std::vector<std::uint32_t>& joined, MeshTriangle* triangle) {
   for (std::size_t k = 0; k < 3; ++k) triangle->vertices[k] = joined[corners[k]];
-  const auto edge = [&](std::size_t k) {
-    return difference(vertices[triangle->vertices[(k + 1) % 3]], vertices[triangle->vertices[k]]);
-  };
-  const Vec3d normal = cross(edge(0), edge(1));
-  const double area = std::sqrt(dot(normal, normal));
-  const double longest =
-      std::max({dot(edge(0), edge(0)), dot(edge(1), edge(1)), dot(edge(2), edge(2))});
-  if (!(area > kLeastHeight * longest)) return false;
-  triangle->normal = {static_cast<Real>(normal.x / area), static_cast<Real>(normal.y / area),
-                      static_cast<Real>(normal.z / area)};
+  const auto corner = [&](std::size_t k) { return vertices[triangle->vertices[k]]; };
+  const detail::TriangleArea area(corner(0), corner(1), corner(2));
+  if (!has_area(area, corner(0), corner(1), corner(2))) return false;
+  triangle->normal = area.unit_normal();
   return true;
 }
 
@@ -218,13 +194,8 @@ class Builder {
   bool is_flat(std::uint32_t edge) const {
     const std::uint32_t i = edge / 3, k = edge % 3;
     const std::vector<Vec3>& at = mesh_.def.vertices;
-    const Vec3& start = at[vertex(i, k)];
-    const Vec3d along = difference(at[vertex(i, k + 1)], start);
-    const Vec3d p = cross(along, difference(at[third_vertex(edge)], start));
-    const Vec3d q = cross(along, difference(at[mesh_.triangles[i].opposite[k]], start));
-    const Vec3d sine = cross(p, q);
-    const double scale = dot(p, p) * dot(q, q);
-    return dot(p, q) < 0 && dot(sine, sine) <= kFlatSine * kFlatSine * scale;
+    return detail::are_flat(at[vertex(i, k)], at[vertex(i, k + 1)], at[third_vertex(edge)],
+                            at[mesh_.triangles[i].opposite[k]]);
   }
 
   void list_neighbors(const std::vector<std::uint64_t>& ends) {

@@ -88,6 +88,9 @@ std::string find_coupled_fault(const BodyDef& def) {
   if (def.mass > 0 && std::holds_alternative<TriangleMesh>(def.shape)) {
     return fault("mass", def.mass, "0 for a triangle mesh, which has no volume");
   }
+  if (def.mass > 0 && std::holds_alternative<Heightfield>(def.shape)) {
+    return fault("mass", def.mass, "0 for a heightfield, which has no volume");
+  }
   if (def.mass > 0 && std::holds_alternative<HalfSpace>(def.shape)) {
     return fault("mass", def.mass, "0 for a half-space, which fills half of the world");
   }

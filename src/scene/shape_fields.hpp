@@ -62,6 +62,20 @@ void each_field(Is<TriangleMesh> auto& mesh, const auto& visit) {
   visit(field("two_sided"), two_sided);
   if constexpr (kIsRead) mesh = TriangleMesh(std::move(def));
 }
+/// The constructor of the heightfield checks all fields.
+void each_field(Is<Heightfield> auto& heightfield, const auto& visit) {
+  constexpr bool kIsRead = !std::is_const_v<std::remove_reference_t<decltype(heightfield)>>;
+  std::conditional_t<kIsRead, HeightfieldDef, const HeightfieldDef&> def = heightfield.def();
+  auto& [columns, rows, spacing_x, spacing_z, heights, holes, two_sided] = def;
+  visit(required_field("columns"), columns);
+  visit(required_field("rows"), rows);
+  visit(required_field("spacing_x"), spacing_x);
+  visit(required_field("spacing_z"), spacing_z);
+  visit(required_field("heights", NotEmpty{"at least four heights"}), heights);
+  visit(field("holes"), holes);
+  visit(field("two_sided"), two_sided);
+  if constexpr (kIsRead) heightfield = Heightfield(std::move(def));
+}
 void each_field(Is<CompoundPart> auto& part, const auto& visit) {
   auto& [shape, position, orientation, density] = part;
   visit(required_field("shape"), shape);

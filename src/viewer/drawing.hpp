@@ -4,7 +4,7 @@
 #include <jfpx/triangle_mesh.hpp>
 
 #include "src/collide/shapes.hpp"
-#include "src/viewer/hull_mesh.hpp"
+#include "src/viewer/surface_mesh.hpp"
 
 #include <cstdint>
 #include <vector>

@@ -4,6 +4,7 @@
 #include "src/collide/mesh_queries.hpp"
 #include "src/viewer/scene_painter.hpp"
 #include "src/viewer/shapes.hpp"
+#include "src/viewer/surface_mesh.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +48,7 @@ Real visible_share(const Vec3& eye, const Bounds& bounds, const Scene& scene,
     const Vec3& from = run_state.states[i].position;
     if (!(scene.bodies[i].mass > 0) || !(length(from - bounds.centre) <= bounds.radius)) continue;
     const bool hidden = std::ranges::any_of(meshes, [&](std::size_t k) {
-      const auto& mesh = std::get<TriangleMesh>(scene.bodies[k].shape);
+      const TriangleMesh mesh = mesh_of(scene.bodies[k].shape);
       return jfpx::detail::enter(from, normalized(eye - from), mesh, pose(run_state.states[k]),
                                  length(eye - from))
           .hit;
@@ -87,7 +88,7 @@ Camera initial_camera(const ViewOptions& options, const Scene& scene, const RunS
   camera = from_height(Real(0.36));
   std::vector<std::size_t> meshes;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    if (std::holds_alternative<TriangleMesh>(scene.bodies[i].shape)) meshes.push_back(i);
+    if (is_mesh(scene.bodies[i].shape)) meshes.push_back(i);
   }
   if (meshes.empty()) return camera;
   const auto share = [&](const Camera& from) {

@@ -116,7 +116,7 @@ void ScenePainter::find_room() {
     const BodyDef& body = scene_.bodies[i];
     if (movable(body) || appearances_[i].kind == Appearance::Kind::hidden) continue;
     obstacles_.push_back(i);
-    if (is_wall(body.shape) || std::holds_alternative<TriangleMesh>(body.shape)) continue;
+    if (is_wall(body.shape) || is_mesh(body.shape)) continue;
     lowest_ = std::min(lowest_, body.position.y - size_of(body.shape));
   }
   find_terrain(bounds);
@@ -126,9 +126,9 @@ void ScenePainter::find_room() {
 void ScenePainter::find_terrain(const Bounds& bounds) {
   for (const std::uint32_t i : obstacles_) {
     const BodyDef& body = scene_.bodies[i];
-    const TriangleMesh* mesh = std::get_if<TriangleMesh>(&body.shape);
-    if (mesh == nullptr || !has_surface(*mesh)) continue;
-    const Aabb box = bounds_of(*mesh, body);
+    const TriangleMesh mesh = mesh_of(body.shape);
+    if (!has_surface(mesh)) continue;
+    const Aabb box = bounds_of(mesh, body);
     lowest_mesh_ = std::min(lowest_mesh_, box.lower.y - body_size_ * kPlate);
     mesh_reach_ = std::max(mesh_reach_, farthest_distance(box, bounds.centre));
     bool around = true;
@@ -142,7 +142,7 @@ void ScenePainter::find_terrain(const Bounds& bounds) {
 
 Paint ScenePainter::paint(std::uint32_t body) const {
   const BodyDef& def = scene_.bodies[body];
-  if (std::holds_alternative<TriangleMesh>(def.shape)) return kStone;
+  if (is_mesh(def.shape)) return kStone;
   if (!movable(def)) return kConcrete;
   if (std::holds_alternative<Box>(def.shape)) return crate_paint(body);
   Paint paint = ball_paint(body);
@@ -159,8 +159,7 @@ ScenePainter::Appearance ScenePainter::appearance_of(std::uint32_t body) const {
   }
   Appearance appearance{Appearance::Kind::still, paint(body)};
   if (!def.kinematic) appearance.paint.pattern = Pattern::plain;
-  const bool has_lines =
-      std::holds_alternative<Box>(def.shape) || std::holds_alternative<TriangleMesh>(def.shape);
+  const bool has_lines = std::holds_alternative<Box>(def.shape) || is_mesh(def.shape);
   if (has_lines) appearance.paint.pattern = Pattern::wall;
   return appearance;
 }
@@ -251,8 +250,8 @@ void ScenePainter::draw_immovable(const Bounds& bounds, Drawing* drawing) const 
 
 void ScenePainter::draw_shape(const Shape& shape, const BodyState& at, Paint paint,
                               Drawing* drawing) const {
-  if (const TriangleMesh* mesh = std::get_if<TriangleMesh>(&shape)) {
-    drawing->add_mesh(*mesh, at.position, at.orientation, cell_for(body_size_), paint);
+  if (is_mesh(shape)) {
+    drawing->add_mesh(mesh_of(shape), at.position, at.orientation, cell_for(body_size_), paint);
   }
   for_each_solid(shape, at, [&](const auto& solid, const BodyState& state) {
     drawing->add_solid(solid, state.position, state.orientation, paint);

@@ -3,6 +3,7 @@
 
 #include "src/scene/compound.hpp"
 #include "src/viewer/mesh_geometry.hpp"
+#include "src/viewer/surface_mesh.hpp"
 
 #include <algorithm>
 #include <variant>
@@ -24,14 +25,14 @@ Real ray_distance(const Shape& shape, const BodyState& state, const Vec3& from,
 Real size_of(const Shape& shape) { return outer_radius(shape); }
 
 Vec3 middle_of(const Shape& shape) {
-  const TriangleMesh* mesh = std::get_if<TriangleMesh>(&shape);
-  return mesh != nullptr && has_surface(*mesh) ? centre_of(*mesh) : Vec3{};
+  const TriangleMesh mesh = mesh_of(shape);
+  return has_surface(mesh) ? centre_of(mesh) : Vec3{};
 }
 
 Real reach_of(const Shape& shape) {
-  const TriangleMesh* mesh = std::get_if<TriangleMesh>(&shape);
-  if (mesh == nullptr || !has_surface(*mesh)) return size_of(shape);
-  const Aabb bounds = bounds_of(*mesh);
+  const TriangleMesh mesh = mesh_of(shape);
+  if (!has_surface(mesh)) return size_of(shape);
+  const Aabb bounds = bounds_of(mesh);
   return length(bounds.upper - bounds.lower) / 2;
 }
 

@@ -1,8 +1,12 @@
-/// Triangulation of hulls.
-#include "src/viewer/hull_mesh.hpp"
+/// Triangulation of hulls and heightfields.
+#include "src/viewer/surface_mesh.hpp"
+
+#include "src/collide/shapes.hpp"
 
 #include <cstdint>
+#include <memory>
 #include <mutex>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 
@@ -24,6 +28,32 @@ TriangleMesh mesh_of(const Hull& hull) {
     }
   }
   return mesh = TriangleMesh(std::move(def));
+}
+
+TriangleMesh mesh_of(const Heightfield& heightfield) {
+  struct Entry {
+    std::weak_ptr<const jfpx::detail::HeightfieldData> data;
+    TriangleMesh mesh;
+  };
+  static std::mutex mutex;
+  static std::unordered_map<const void*, Entry> meshes;
+  const std::lock_guard lock(mutex);
+  // Precedes the search, because the address of a heightfield can be that of an earlier one.
+  std::erase_if(meshes, [](const auto& entry) { return entry.second.data.expired(); });
+  Entry& entry = meshes[heightfield.data().get()];
+  if (entry.mesh.data() == nullptr) entry = {heightfield.data(), to_triangle_mesh(heightfield)};
+  return entry.mesh;
+}
+
+TriangleMesh mesh_of(const Shape& shape) {
+  if (const auto* mesh = std::get_if<TriangleMesh>(&shape)) return *mesh;
+  const auto* heightfield = std::get_if<Heightfield>(&shape);
+  return heightfield != nullptr ? mesh_of(*heightfield) : TriangleMesh();
+}
+
+bool is_mesh(const Shape& shape) {
+  return std::visit([](const auto& s) { return jfpx::detail::kIsMesh<std::decay_t<decltype(s)>>; },
+                    shape);
 }
 
 }  // namespace view

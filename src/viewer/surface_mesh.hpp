@@ -1,8 +1,7 @@
-/// Surfaces of hulls as triangle meshes.
+/// Surfaces of shapes as triangle meshes.
 #pragma once
 
-#include <jfpx/hull.hpp>
-#include <jfpx/triangle_mesh.hpp>
+#include <jfpx/shape.hpp>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -11,6 +10,13 @@ namespace view {
 /// The surface of a hull, for drawing. It is made once for all copies of the hull, and kept. Can be
 /// called by several threads.
 TriangleMesh mesh_of(const Hull& hull);
+/// The triangles of a heightfield, which are made once for all copies and kept as long as these.
+/// Can be called by several threads.
+TriangleMesh mesh_of(const Heightfield& heightfield);
+/// The mesh of a triangle mesh or a heightfield; without triangles for other shapes.
+TriangleMesh mesh_of(const Shape& shape);
+/// Whether a shape is a triangle mesh or a heightfield.
+bool is_mesh(const Shape& shape);
 
 }  // namespace view
 }  // namespace JFPX_ABI

@@ -186,6 +186,42 @@ TEST(SceneWorld, PlanesAndBoxesHoldABall) {
   }
 }
 
+/// Balls in the pits of a heightfield, where they touch triangles on both sides of each diagonal.
+TEST(SceneWorld, HeightfieldsAreWhereTheNativeWorldHasThem) {
+  for (const bool has_hole : {false, true}) {
+    HeightfieldDef def{4, 5, Real(1.5), 1, std::vector<Real>(20, 3), {}, false};
+    def.heights[5] = Real(2.5);   // row 1, column 1
+    def.heights[14] = Real(2.4);  // row 3, column 2
+    if (has_hole) def.holes = {9};
+    const Heightfield ground(def);
+    Scene scene;
+    for (const Vec3& pit : {ground.vertex(1, 1), ground.vertex(3, 2)}) {
+      scene.bodies.push_back(ball(pit + Vec3{Real(0.05), Real(0.6), Real(-0.03)}));
+      scene.bodies.back().friction = 1;
+      scene.bodies.back().rolling_friction = Real(0.01);
+    }
+    scene.bodies.push_back(ball(ground.vertex(2, 1) + Vec3{Real(0.75), 1, Real(0.5)}, Real(0.2)));
+    BodyDef fixed;
+    fixed.mass = 0;
+    fixed.shape = ground;
+    scene.bodies.push_back(fixed);
+    SceneWorld world(scene);
+    World native(scene);
+    for (int i = 0; i < 240; ++i) {
+      world.step();
+      native.step();
+    }
+    const std::vector<BodyState> states = world.states();
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Vec3 expected = native.state(native.bodies()[i]).position;
+      EXPECT_LT(length(states[i].position - expected), Real(0.03)) << i;
+    }
+    const Real third = native.state(native.bodies()[2]).position.y;
+    EXPECT_EQ(third < 0, has_hole);
+    EXPECT_EQ(states[2].position.y < 0, has_hole);
+  }
+}
+
 /// An angle of two bars, whose inertia tensor is not diagonal.
 BodyDef angle_iron(const Vec3& position) {
   BodyDef def = ball(position);

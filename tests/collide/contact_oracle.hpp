@@ -49,7 +49,15 @@ class ContactOracle {
     bool is_wall() const {
       return std::holds_alternative<HalfSpace>(shape) || std::holds_alternative<Plane>(shape);
     }
-    bool is_mesh() const { return std::holds_alternative<TriangleMesh>(shape); }
+    bool is_mesh() const {
+      return std::holds_alternative<TriangleMesh>(shape) ||
+             std::holds_alternative<Heightfield>(shape);
+    }
+    detail::MeshView mesh() const {
+      const auto* heightfield = std::get_if<Heightfield>(&shape);
+      return heightfield != nullptr ? detail::view_of(*heightfield)
+                                    : detail::view_of(std::get<TriangleMesh>(shape));
+    }
     /// Order of the kinds: spheres, boxes, capsules, hulls, meshes, walls.
     int kind() const {
       if (is_sphere()) return 0;
@@ -111,12 +119,12 @@ class ContactOracle {
     }
   }
 
-  /// Tests all triangles of a mesh.
+  /// Tests all triangles of a mesh or a heightfield.
   void test_triangles(const SubShape& p, const SubShape& mesh) {
-    const detail::MeshView view = detail::view_of(std::get<TriangleMesh>(mesh.shape));
+    const detail::MeshView view = mesh.mesh();
     const auto test_solid = [&](const auto& solid) {
       for (std::uint32_t i = 0; i < view.triangle_count; ++i) {
-        if (!view.triangles[i].has_contacts()) continue;
+        if (!view.has_triangle(i)) continue;
         detail::PairManifold found;
         find_contact_with_triangle(detail::instance(solid, p.pose), view, i, mesh.pose, {}, &found);
         for (std::uint32_t k = 0; k < found.touch_count; ++k) {

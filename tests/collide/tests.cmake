@@ -3,6 +3,7 @@ jfpx_add_test(collide_test INTERNAL SOURCES
   collide/capsule_test.cpp
   collide/collide_test.cpp
   collide/core_sweep_test.cpp
+  collide/heightfield_test.cpp
   collide/hull_contact_test.cpp
   collide/hull_faces_test.cpp
   collide/hull_test.cpp

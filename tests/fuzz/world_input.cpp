@@ -72,8 +72,23 @@ TriangleMesh draw_mesh(Bytes& bytes) {
   return TriangleMesh(std::move(def));
 }
 
+/// @throws InvalidArgument for a number that is out of range
+Heightfield draw_heightfield(Bytes& bytes) {
+  HeightfieldDef def;
+  def.columns = static_cast<std::uint32_t>(2 + bytes.below(4));
+  def.rows = static_cast<std::uint32_t>(2 + bytes.below(4));
+  def.spacing_x = bytes.number(Real(0.2), 2);
+  def.spacing_z = bytes.number(Real(0.2), 2);
+  for (std::uint32_t i = 0; i < def.columns * def.rows; ++i) {
+    def.heights.push_back(bytes.number(-1, 1));
+  }
+  if (bytes.chance(Real(0.5))) def.holes.push_back(static_cast<std::uint32_t>(bytes.below(8)));
+  def.two_sided = bytes.chance(Real(0.5));
+  return Heightfield(std::move(def));
+}
+
 Shape draw_shape(Bytes& bytes) {
-  switch (bytes.below(12)) {
+  switch (bytes.below(13)) {
     case 0:
     case 1:
       return draw_box(bytes);
@@ -95,6 +110,12 @@ Shape draw_shape(Bytes& bytes) {
     case 11:
       try {
         return draw_mesh(bytes);
+      } catch (const InvalidArgument&) {
+        return draw_box(bytes);
+      }
+    case 12:
+      try {
+        return draw_heightfield(bytes);
       } catch (const InvalidArgument&) {
         return draw_box(bytes);
       }
@@ -131,7 +152,8 @@ BodyDef draw_body(Bytes& bytes) {
   def.shape = draw_shape(bytes);
   const bool wall = std::holds_alternative<HalfSpace>(def.shape) ||
                     std::holds_alternative<Plane>(def.shape) ||
-                    std::holds_alternative<TriangleMesh>(def.shape);
+                    std::holds_alternative<TriangleMesh>(def.shape) ||
+                    std::holds_alternative<Heightfield>(def.shape);
   def.mass = bytes.chance(wall ? Real(0.95) : Real(0.15)) ? Real(0) : bytes.number(Real(0.1), 5);
   def.kinematic = def.mass == 0 && bytes.chance(Real(0.3));
   if (bytes.chance(Real(0.1))) def.inertia = draw_matrix(bytes);

@@ -755,6 +755,42 @@ def test_faults_of_a_triangle_mesh_are_named(arguments, message):
     assert len(scene) == 0
 
 
+def test_a_heightfield_carries_a_ball():
+    for dtype in ("float32", "float64"):
+        scene = jfpx.Scene(dtype=dtype)
+        heights = np.zeros((5, 7))
+        heights[0, 0] = 2
+        holes = np.zeros((4, 6), bool)
+        holes[3, 2] = True
+        scene.add_heightfield(heights, (1.5, 2), holes=holes, position=[0, 1, 0], friction=0.9)
+        scene.add_spheres([[0.3, 2, 0.1]], 0.5)
+        shape = scene.to_dict()["bodies"][0]["shape"]
+        assert shape == {"type": "heightfield", "columns": 7, "rows": 5, "spacing_x": 1.5, "spacing_z": 2,
+                         "heights": heights.ravel().tolist(), "holes": [23], "two_sided": False}
+        with jfpx.World(scene) as world:
+            for _ in range(200):
+                world.step()
+            assert abs(world.states().positions[1, 1] - 1.5) < 1e-3
+
+
+@pytest.mark.parametrize(("arguments", "options", "message"), [
+    (([1, 2, 3],), {}, r"heights has shape \(3,\); it must be \(rows, columns\)"),
+    (([[1, 2]],), {}, "rows is 1; it must be from 2 to 65536"),
+    (([[0, np.nan], [0, 0]],), {}, r"heights\[1\] is nan"),
+    (([[0, 0], [0, 0]], 0), {}, "spacing_x is 0"),
+    (([[0, 0], [0, 0]], (1, -1)), {}, "spacing_z is -1"),
+    (([[0, 0], [0, 0]], "wide"), {}, "spacing is 'wide'"),
+    (([[0, 0], [0, 0]], (1, 2, 3)), {}, r"spacing has shape \(3,\)"),
+    (([[0, 0], [0, 0]],), {"holes": [[1]]}, r"holes has shape \(1, 1\) and dtype int64"),
+    (([[0, 0], [0, 0]],), {"shape": {}}, "shape is given"),
+])
+def test_faults_of_a_heightfield_are_named(arguments, options, message):
+    scene = jfpx.Scene()
+    with pytest.raises(jfpx.InvalidArgument, match=message):
+        scene.add_heightfield(*arguments, **options)
+    assert len(scene) == 0
+
+
 def test_fields_of_the_body_of_a_mesh_are_checked():
     scene = jfpx.Scene()
     with pytest.raises(jfpx.InvalidScene, match="mass is 1; it must be 0 for a triangle mesh"):

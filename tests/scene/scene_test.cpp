@@ -392,7 +392,7 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
               HasSubstr("body 0: has no field \"shape\""));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
               HasSubstr("\"cone\"; it must be sphere, box, half_space, plane, compound, capsule, "
-                        "triangle_mesh or hull"));
+                        "triangle_mesh, hull or heightfield"));
   const auto with_parts = [](const std::string& parts) {
     return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "compound", "parts": )" + parts +
            "}}]}";

@@ -166,6 +166,19 @@ TEST(ScenePainter, DrawsMeshesAtTheInterpolatedPoseOfTheirBody) {
   EXPECT_EQ(drawing.meshes()[0].mesh.data(), std::get<TriangleMesh>(scene.bodies[1].shape).data());
 }
 
+TEST(ScenePainter, DrawsHeightfieldsAsMeshesThatTheyShare) {
+  Scene scene;
+  const Heightfield hills({3, 2, 1, 2, {0, 1, 0, 0, 2, 0}, {1}, false});
+  add(&scene, Sphere{}, {0, 5, 0}, 1);
+  add(&scene, hills, {1, 2, 3}, 0);
+  add(&scene, hills, {5, 2, 3}, 0);
+  const Drawing drawing = test::draw(scene, run_state_of(scene));
+  ASSERT_EQ(drawing.meshes().size(), 2u);
+  EXPECT_EQ(drawing.meshes()[0].mesh.data(), drawing.meshes()[1].mesh.data());
+  EXPECT_EQ(drawing.meshes()[0].mesh, to_triangle_mesh(hills));
+  EXPECT_THAT(drawing.meshes()[0].mesh.triangles(), SizeIs(2));
+}
+
 TEST(ScenePainter, DrawsNoGroundUnderATerrainAndOneBelowSmallMeshes) {
   const auto flat = [](Real, Real) { return Real(-7); };
   Scene scene;

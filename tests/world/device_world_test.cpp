@@ -124,6 +124,44 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
   }
 }
 
+/// Heightfields of several tiles, one of which moves, with slow and fast bodies.
+TEST_P(DeviceWorldTest, BodiesOnHeightfieldsHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  std::uint64_t contacts = 0;
+  for (int k = 0; k < 3; ++k) {
+    Scene scene;
+    BodyDef ground;
+    ground.mass = 0;
+    ground.shape = Heightfield(test::random_heightfield(&random, 60));
+    scene.bodies.push_back(ground);
+    ground.shape = Heightfield(test::random_heightfield(&random, 20));
+    ground.kinematic = true;
+    ground.position.y = 1;
+    ground.angular_velocity = {0.2_r, 1, 0};
+    scene.bodies.push_back(ground);
+    for (int i = 0; i < 120; ++i) {
+      BodyDef def = test::random_body(&random, 6);
+      if (!test::has_volume(def.shape)) def.shape = Sphere{0.3_r};
+      def.mass = 1;
+      def.position.y = random.uniform(1, 4);
+      def.velocity.y = i % 4 == 0 ? -100.0_r : 0.0_r;
+      scene.bodies.push_back(def);
+    }
+    World host = on_host(scene), device = on_device(scene);
+    for (int n = 0; n < scene_steps(40); ++n) {
+      const StepReport a = host.step(), b = device.step();
+      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+      contacts += a.contacts;
+    }
+    ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+    EXPECT_TRUE(WorldAccess::impl(device).resident());
+  }
+  EXPECT_GT(contacts, 1000u);
+}
+
 /// Enough immovable and kinematic solids for trees of several levels, which come, go and move.
 TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
   const std::uint64_t seed = test::fresh_seed();

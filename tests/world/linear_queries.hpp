@@ -96,10 +96,12 @@ class LinearQueries {
     const detail::MeshRay ray_in_mesh(from, along);
     detail::RayEntry first;
     for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
-      if (!mesh.triangles[i].has_contacts()) continue;
+      if (!mesh.has_triangle(i)) continue;
       const Real distance = ray_in_mesh.hit(mesh, i);
       if (!(distance >= 0) || (first.hit && distance >= first.distance)) continue;
-      const Vec3& n = mesh.triangles[i].normal;
+      Vec3 corners[3];
+      mesh.get_corners(i, corners);
+      const Vec3 n = mesh.normal(i, corners);
       first = {true, distance, pose.basis * (dot(n, along) > 0 ? -n : n)};
     }
     return first;
@@ -133,7 +135,7 @@ class LinearQueries {
                            const detail::MeshView& mesh, const Transform& pose) {
     bool any = false;
     for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
-      if (!mesh.triangles[i].has_contacts()) continue;
+      if (!mesh.has_triangle(i)) continue;
       detail::PairManifold manifold;
       std::visit(
           [&](const auto& s) {

@@ -57,6 +57,14 @@ class RandomPlace {
       for (Vec3& vertex : scaled.vertices) vertex *= most;
       *mesh = TriangleMesh(std::move(scaled));
     }
+    if (auto* heightfield = std::get_if<Heightfield>(&def.shape)) {
+      HeightfieldDef scaled = heightfield->def();
+      const Real most = std::min(size_, kMaxCoordinate / 100);
+      scaled.spacing_x *= most;
+      scaled.spacing_z *= most;
+      for (Real& height : scaled.heights) height *= most;
+      *heightfield = Heightfield(std::move(scaled));
+    }
     if (auto* compound = std::get_if<Compound>(&def.shape)) {
       for (CompoundPart& part : compound->parts) {
         std::visit(scale, part.shape);

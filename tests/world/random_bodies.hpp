@@ -60,7 +60,8 @@ inline Compound random_compound(Random* random) {
 /// Whether a body with the shape may be movable.
 inline bool has_volume(const Shape& shape) {
   return !std::holds_alternative<HalfSpace>(shape) && !std::holds_alternative<Plane>(shape) &&
-         !std::holds_alternative<TriangleMesh>(shape);
+         !std::holds_alternative<TriangleMesh>(shape) &&
+         !std::holds_alternative<Heightfield>(shape);
 }
 
 /// A sheet of triangles, with holes.
@@ -84,8 +85,32 @@ inline TriangleMesh random_mesh(Random* random) {
   return TriangleMesh(std::move(def));
 }
 
+/// A heightfield of up to `most` rows and columns, often rough, often with holes.
+inline HeightfieldDef random_heightfield(Random* random, std::uint32_t most) {
+  HeightfieldDef def;
+  def.columns = static_cast<std::uint32_t>(2 + random->below(most - 1));
+  def.rows = static_cast<std::uint32_t>(2 + random->below(most - 1));
+  def.spacing_x = random->uniform(0.3_r, 2);
+  def.spacing_z = random->below(2) == 0 ? def.spacing_x : random->uniform(0.3_r, 2);
+  const std::uint64_t kind = random->below(4);
+  const Real roughness = kind == 0 ? Real(0) : random->uniform(0, 1);
+  for (std::uint32_t i = 0; i < def.rows * def.columns; ++i) {
+    // Steps have flat parts.
+    Real height = random->uniform(-1, 1);
+    if (kind == 1) height = random->below(4) == 0 ? Real(1) : Real(0);
+    def.heights.push_back(roughness * height);
+  }
+  const std::uint64_t holes = random->below(2) == 0 ? 0 : random->below(4);
+  for (std::uint64_t left = holes; left > 0; --left) {
+    const std::uint64_t row = random->below(def.rows - 1), column = random->below(def.columns - 1);
+    def.holes.push_back(static_cast<std::uint32_t>(row * def.columns + column));
+  }
+  def.two_sided = random->below(2) == 0;
+  return def;
+}
+
 /// A sphere, another solid or a compound with a probability of about a third each, sometimes
-/// immovable; rarely a mesh or a wall.
+/// immovable; rarely a mesh, a heightfield or a wall.
 inline BodyDef random_body(Random* random, Real room) {
   BodyDef def;
   const std::uint64_t kind = random->below(33);
@@ -95,6 +120,7 @@ inline BodyDef random_body(Random* random, Real room) {
   if (kind > 1) def.shape = std::visit([](auto s) -> Shape { return s; }, random_sub_shape(random));
   if (kind > 20) def.shape = random_compound(random);
   if (kind > 30) def.shape = random_mesh(random);
+  if (kind == 32) def.shape = Heightfield(random_heightfield(random, 6));
   def.mass = kind < 2 || kind > 30 || random->below(6) == 0 ? Real(0) : random->uniform(0.5_r, 2);
   def.position = random->uniform_in_box({-room, -room, -room}, {room, room, room});
   def.orientation = random_rotation(random);

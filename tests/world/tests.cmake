@@ -55,6 +55,7 @@ set_source_files_properties(world/portable_files_test.cpp PROPERTIES
 jfpx_add_test(quality_test THESIS SOURCES
   world/box_rest_test.cpp
   world/continuous_collision_test.cpp
+  world/heightfield_world_test.cpp
   world/mesh_world_test.cpp
   world/equilibrium_test.cpp
   world/free_rotation_test.cpp

@@ -16,6 +16,7 @@
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleMesh.h>
@@ -97,6 +98,25 @@ class ShapeStore {
     if (share_) shared_meshes_.emplace(mesh.data(), shapes_.back().get());
     return shapes_.back().get();
   }
+  /// Bullet's heightfields are two-sided and have no holes, and the same diagonals. The range of
+  /// the heights is symmetric, because Bullet moves its middle to the origin.
+  btCollisionShape* make(const Heightfield& heightfield, const btTransform& axes) {
+    const HeightfieldDef& def = heightfield.def();
+    if (!def.holes.empty()) return make(to_triangle_mesh(heightfield), axes);
+    if (share_) {
+      const auto found = shared_heightfields_.find(heightfield.data());
+      if (found != shared_heightfields_.end()) return found->second;
+    }
+    const btScalar highest = heightfield.data()->half_extents.y;
+    auto shape = std::make_unique<btHeightfieldTerrainShape>(
+        static_cast<int>(def.columns), static_cast<int>(def.rows), def.heights.data(), -highest,
+        highest, 1, false);
+    shape->setLocalScaling({def.spacing_x, 1, def.spacing_z});
+    heightfields_.push_back(heightfield);
+    shapes_.push_back(std::move(shape));
+    if (share_) shared_heightfields_.emplace(heightfield.data(), shapes_.back().get());
+    return shapes_.back().get();
+  }
   /// Unreachable, because require_bullet() rejects planes.
   btCollisionShape* make(const Plane&, const btTransform&) { return nullptr; }
 
@@ -144,8 +164,10 @@ class ShapeStore {
 
   bool share_;
   std::vector<std::unique_ptr<btTriangleMesh>> triangles_;  ///< of the shapes
+  std::vector<Heightfield> heightfields_;                   ///< whose heights the shapes use
   std::vector<std::unique_ptr<btCollisionShape>> shapes_;
   std::map<std::shared_ptr<const detail::MeshData>, btCollisionShape*> shared_meshes_;
+  std::map<std::shared_ptr<const detail::HeightfieldData>, btCollisionShape*> shared_heightfields_;
   std::map<Key, btCollisionShape*> shared_;
 };
 

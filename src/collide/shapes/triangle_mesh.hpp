@@ -1,4 +1,5 @@
-/// The triangle mesh: name, and contacts of its triangles with spheres, capsules and boxes.
+/// The triangle mesh and the heightfield: names, and contacts of their triangles with spheres,
+/// capsules and boxes.
 #pragma once
 
 #include "src/collide/box_triangle.hpp"
@@ -11,6 +12,8 @@ namespace detail {
 
 template <>
 inline constexpr const char* kShapeName<TriangleMesh> = "triangle_mesh";
+template <>
+inline constexpr const char* kShapeName<Heightfield> = "heightfield";
 
 /// A ball and a triangle, by the closest point of the triangle.
 JFPX_HD inline void find_contact(const SphereInstance& a, const TriangleInstance& b,

@@ -206,10 +206,11 @@ struct SweptBounds {
     }
     reach += 64 * kEpsilon * (sum(sphere.centre) + sum(pose.origin) + reach);
     const Vec3 local = transform_transpose(pose.basis, offset), half{reach, reach, reach};
-    view.tree.visit_overlapping({local - half, local + half}, [&](std::uint32_t index) {
-      const detail::MeshTriangle& triangle = view.triangles[index];
-      const Vec3 arm = local - view.vertices[triangle.vertices[0]];
-      const Real height = dot(triangle.normal, arm);
+    view.visit_overlapping({local - half, local + half}, [&](std::uint32_t index) {
+      Vec3 corner[3];
+      view.get_corners(index, corner);
+      const Vec3 arm = local - corner[0];
+      const Real height = dot(view.normal(index, corner), arm);
       if (absolute(height) <= reach + 8 * kEpsilon * sum(arm)) visit(mesh, index);
     });
   }

@@ -1,4 +1,4 @@
-/// The triangle meshes of the bodies in the memory of a device.
+/// The triangle meshes and heightfields of the bodies in the memory of a device.
 #pragma once
 
 #include "src/collide/mesh_bounds.hpp"
@@ -26,8 +26,13 @@ class MeshBuffers {
     for (Copy& copy : copies_) copy.in_use = false;
     views_.clear();
     for (const BodyId id : ids) {
-      const auto* mesh = std::get_if<TriangleMesh>(&bodies.shape(id.index));
-      if (mesh != nullptr) views_.push_back(view_of(transfer, *mesh));
+      std::visit(
+          [&](const auto& shape) {
+            if constexpr (detail::kIsMesh<std::decay_t<decltype(shape)>>) {
+              views_.push_back(view_of(transfer, shape.data()));
+            }
+          },
+          bodies.shape(id.index));
     }
     transfer.wait();
     copies_.remove_if([](const Copy& copy) { return !copy.in_use; });
@@ -39,35 +44,56 @@ class MeshBuffers {
   using Buffer = typename Device::template Buffer<T>;
   /// A mesh, which copies of its shape share.
   struct Copy {
-    std::shared_ptr<const detail::MeshData> data;
+    std::shared_ptr<const void> data;
     bool in_use = true;
     Buffer<Vec3> vertices;
     Buffer<detail::MeshTriangle> triangles;
     Buffer<std::uint32_t> first_neighbor, neighbors;
     BlockTreeBuffers<Device> tree;
+    Buffer<Real> heights;
+    Buffer<std::uint8_t> cells;
+    Buffer<detail::HeightRange> tiles;
     detail::MeshView view;
   };
 
-  const detail::MeshView& view_of(const Transfer<Device>& transfer, const TriangleMesh& mesh) {
+  /// @param data MeshData or HeightfieldData
+  template <class Data>
+  const detail::MeshView& view_of(const Transfer<Device>& transfer,
+                                  const std::shared_ptr<const Data>& data) {
     const auto found =
-        std::ranges::find_if(copies_, [&](const Copy& copy) { return copy.data == mesh.data(); });
+        std::ranges::find_if(copies_, [&](const Copy& copy) { return copy.data == data; });
     if (found != copies_.end()) {
       found->in_use = true;
       return found->view;
     }
     std::list<Copy> made(1);  // kept only once it is complete
     Copy& copy = made.back();
-    copy.data = mesh.data();
-    const detail::MeshView from = copy.data->view();
-    copy.view = from;
-    copy.view.vertices = transfer.put(&copy.vertices, from.vertices, from.vertex_count);
-    copy.view.triangles = transfer.put(&copy.triangles, from.triangles, from.triangle_count);
-    copy.view.first_neighbor =
-        transfer.put(&copy.first_neighbor, from.first_neighbor, from.vertex_count + 1);
-    copy.view.neighbors = transfer.put(&copy.neighbors, from.neighbors, from.neighbor_count);
-    copy.view.tree = copy.tree.upload(transfer, from.tree);
+    copy.data = data;
+    copy.view = data->view();
+    if (copy.view.is_grid()) {
+      upload_grid(transfer, &copy);
+    } else {
+      upload_mesh(transfer, &copy);
+    }
     copies_.splice(copies_.end(), made);
     return copy.view;
+  }
+  void upload_mesh(const Transfer<Device>& transfer, Copy* copy) {
+    const detail::MeshView from = copy->view;
+    copy->view.vertices = transfer.put(&copy->vertices, from.vertices, from.vertex_count);
+    copy->view.triangles = transfer.put(&copy->triangles, from.triangles, from.triangle_count);
+    copy->view.first_neighbor =
+        transfer.put(&copy->first_neighbor, from.first_neighbor, from.vertex_count + 1);
+    copy->view.neighbors = transfer.put(&copy->neighbors, from.neighbors, from.neighbor_count);
+    copy->view.tree = copy->tree.upload(transfer, from.tree);
+  }
+  /// The tree of the tiles is for rays on the host.
+  void upload_grid(const Transfer<Device>& transfer, Copy* copy) {
+    const detail::GridView from = copy->view.grid;
+    copy->view.grid.heights = transfer.put(&copy->heights, from.heights, from.vertex_count());
+    copy->view.grid.cells = transfer.put(&copy->cells, from.cells, from.cell_count());
+    copy->view.grid.tiles = transfer.put(&copy->tiles, from.tiles, from.tile_count());
+    copy->view.tree = {};
   }
 
   std::list<Copy> copies_;
