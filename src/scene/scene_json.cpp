@@ -334,6 +334,8 @@ Json parse(std::string_view text) {
 
 Json parse_json(std::string_view text) { return parse(text); }
 
+Scene scene_from_value(const Json& json) { return scene_from(json); }
+
 BodyDef body_from_value(const Json& json) {
   BodyDef body;
   read(json, "body", body);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <jfpx/body.hpp>
+#include <jfpx/scene.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -24,7 +25,9 @@ using SceneJson = nlohmann::basic_json<nlohmann::ordered_map, std::vector, std::
 /// A body from the JSON of a scene. @throws InvalidScene
 BodyDef body_from_value(const detail::SceneJson& json);
 /// Parses a text of bounded depth whose objects have unique keys. @throws InvalidScene
-detail::SceneJson parse_json(std::string_view text);
+JFPX_API detail::SceneJson parse_json(std::string_view text);
+/// A scene from its JSON, as from_json(). @throws InvalidScene
+JFPX_API Scene scene_from_value(const detail::SceneJson& json);
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

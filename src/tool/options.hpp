@@ -18,9 +18,9 @@ CLI::Validator whole_number(std::uint64_t largest = std::numeric_limits<std::uin
 /// Adds --threads.
 void add_threads_option(CLI::App& app, unsigned& threads);
 /// Adds SCENE, with `scene` as its help text, and the options that select and modify a scene.
-void add_scene_options(
-    CLI::App& app, RunOptions& options,
-    const std::string& scene = "Name of a scene (see: jfpx scenes) or a JSON file");
+void add_scene_options(CLI::App& app, RunOptions& options,
+                       const std::string& scene =
+                           "Name of a scene (see: jfpx scenes), a JSON file or a file of a mesh");
 /// Adds --steps, --backend, --threads, --minimum-batch, --solver, --world, --json, --hash, --quiet.
 void add_run_options(CLI::App& app, RunOptions& options);
 /// Adds --backend, which sets `backend`.

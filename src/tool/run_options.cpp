@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/tool/demo_names.hpp"
+#include "src/tool/scene_file.hpp"
 
 #include <fmt/format.h>
 
@@ -77,7 +78,7 @@ Scene load(const RunOptions& options) {
       throw InvalidArgument(std::string(option) + " requires a named scene; " + options.scene +
                             " is a file");
     }
-    scene = load_scene(options.scene);
+    scene = load_scene_file(options.scene);
   } else {
     if (is_only_a_demo(options.scene)) {
       throw InvalidArgument(

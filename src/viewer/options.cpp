@@ -83,9 +83,10 @@ void check_demo(const ViewOptions& options) {
 
 /// Adds the options except --precision; they write to `options`.
 void add_view_options(CLI::App& app, ViewOptions& options) {
-  tool::add_scene_options(app, options.run,
-                          "Name of a scene or demo (see: jfpx scenes), a JSON file, or a recording "
-                          "(.rec)");
+  tool::add_scene_options(
+      app, options.run,
+      "Name of a scene or demo (see: jfpx scenes), a JSON file, a file of a mesh, "
+      "or a recording (.rec)");
   app.add_flag("--side-by-side", options.side_by_side,
                "Step native jfpx, stock Bullet and Bullet with jfpx together and compare them");
   app.add_option_function<std::string>(

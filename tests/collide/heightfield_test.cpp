@@ -22,7 +22,7 @@ using test::operator""_r;
 using detail::MeshView;
 using testing::HasSubstr;
 
-std::string message_of(HeightfieldDef def) {
+std::string fault_of(HeightfieldDef def) {
   try {
     Heightfield heightfield(std::move(def));
   } catch (const InvalidArgument& error) {
@@ -33,11 +33,11 @@ std::string message_of(HeightfieldDef def) {
 
 TEST(Heightfield, ErrorsNameTheMember) {
   const HeightfieldDef good{3, 2, 1, 1, std::vector<Real>(6, 0), {}, false};
-  EXPECT_EQ(message_of(good), "no error");
+  EXPECT_EQ(fault_of(good), "no error");
   const auto complaint = [&](const auto& change) {
     HeightfieldDef def = good;
     change(def);
-    return message_of(std::move(def));
+    return fault_of(std::move(def));
   };
   EXPECT_THAT(complaint([](HeightfieldDef& d) { d.columns = 1; }),
               HasSubstr("columns is 1; it must be from 2 to 65536"));
@@ -77,13 +77,13 @@ TEST(Heightfield, CopiesShareTheirData) {
 }
 
 /// A heightfield and the mesh of its triangles.
-struct Twins {
+struct GridAndMesh {
   Heightfield heightfield;
   TriangleMesh mesh;
   MeshView grid, arrays;
   std::vector<std::uint32_t> numbers;  ///< by triangle of the mesh: that of the heightfield
 
-  explicit Twins(HeightfieldDef def)
+  explicit GridAndMesh(HeightfieldDef def)
       : heightfield(std::move(def)),
         mesh(to_triangle_mesh(heightfield)),
         grid(detail::view_of(heightfield)),
@@ -101,7 +101,7 @@ struct Twins {
   }
 };
 
-std::set<std::uint32_t> neighbors(const MeshView& mesh, std::uint32_t vertex) {
+std::set<std::uint32_t> ring_of(const MeshView& mesh, std::uint32_t vertex) {
   std::set<std::uint32_t> found;
   mesh.all_neighbors(vertex, [&](std::uint32_t neighbor) {
     found.insert(neighbor);
@@ -115,7 +115,7 @@ TEST(Heightfield, TrianglesAndNeighborsAreThoseOfTheMesh) {
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   for (int run = 0; run < 60; ++run) {
-    const Twins twins(test::random_heightfield(&random, run % 5 == 0 ? 40 : 6));
+    const GridAndMesh twins(test::random_heightfield(&random, run % 5 == 0 ? 40 : 6));
     ASSERT_EQ(twins.numbers.size(), twins.mesh.triangles().size());
     const std::vector<std::uint32_t> holes = twins.heightfield.def().holes;
     const std::size_t hole_count = std::set<std::uint32_t>(holes.begin(), holes.end()).size();
@@ -137,13 +137,13 @@ TEST(Heightfield, TrianglesAndNeighborsAreThoseOfTheMesh) {
       }
     }
     for (std::uint32_t i = 0; i < twins.grid.vertex_count; ++i) {
-      ASSERT_EQ(neighbors(twins.grid, i), neighbors(twins.arrays, i)) << i;
+      ASSERT_EQ(ring_of(twins.grid, i), ring_of(twins.arrays, i)) << i;
     }
   }
 }
 
 /// Coordinates near those of vertices, and equal to them.
-Real coordinate(Random* random, Real first, Real size) {
+Real coordinate_near(Random* random, Real first, Real size) {
   const std::uint64_t kind = random->below(8);
   if (kind == 0) return first + size * static_cast<Real>(random->below(40));
   if (kind == 1) return random->uniform(-1e4_r, 1e4_r);
@@ -156,12 +156,12 @@ TEST(Heightfield, SearchFindsTheTrianglesOfTheMesh) {
   Random random(seed);
   std::size_t found = 0;
   for (int run = 0; run < 60; ++run) {
-    const Twins twins(test::random_heightfield(&random, run % 2 == 0 ? 40 : 6));
+    const GridAndMesh twins(test::random_heightfield(&random, run % 2 == 0 ? 40 : 6));
     const Vec3 first = twins.heightfield.vertex(0, 0);
     for (int n = 0; n < 60; ++n) {
-      const Vec3 from{coordinate(&random, first.x, twins.heightfield.def().spacing_x),
+      const Vec3 from{coordinate_near(&random, first.x, twins.heightfield.def().spacing_x),
                       random.uniform(-2, 2),
-                      coordinate(&random, first.z, twins.heightfield.def().spacing_z)};
+                      coordinate_near(&random, first.z, twins.heightfield.def().spacing_z)};
       const Vec3 size = random.uniform_in_box({0, 0, 0}, {1, 1, 1}) *
                         (random.below(4) == 0 ? Real(0) : random.uniform(0, 9));
       std::vector<std::uint32_t> in_grid, in_tree;
@@ -183,7 +183,7 @@ TEST(Heightfield, ContactsAreThoseOfTheMesh) {
   Random random(seed);
   std::size_t touching = 0;
   for (int run = 0; run < 100; ++run) {
-    const Twins twins(test::random_heightfield(&random, 7));
+    const GridAndMesh twins(test::random_heightfield(&random, 7));
     const Transform pose = make_transform(test::random_rotation(&random),
                                           random.uniform_in_box({-5, -5, -5}, {5, 5, 5}));
     for (int n = 0; n < 20; ++n) {
@@ -223,7 +223,7 @@ TEST(Heightfield, ContactsAreThoseOfTheMesh) {
 }
 
 /// A ray with a random origin near a heightfield. Some are vertical, or in a plane of vertices.
-std::pair<Vec3, Vec3> random_ray(Random* random, const Twins& twins) {
+std::pair<Vec3, Vec3> random_ray(Random* random, const GridAndMesh& twins) {
   const HeightfieldDef& def = twins.heightfield.def();
   const Vec3 reach = twins.heightfield.data()->half_extents;
   Vec3 from = random->uniform_in_box(-reach, reach) * 2 + Vec3{0, random->uniform(-3, 3), 0};
@@ -247,7 +247,7 @@ TEST(Heightfield, RaysAreThoseOfTheMesh) {
   Random random(seed);
   int hits = 0;
   for (int run = 0; run < 60; ++run) {
-    const Twins twins(test::random_heightfield(&random, run % 2 == 0 ? 60 : 6));
+    const GridAndMesh twins(test::random_heightfield(&random, run % 2 == 0 ? 60 : 6));
     for (int n = 0; n < 200; ++n) {
       const auto [from, direction] = random_ray(&random, twins);
       const Transform pose =
@@ -295,18 +295,18 @@ TEST(Heightfield, RaysAreThoseOfAnOracleInDouble) {
   for (int run = 0; run < 30; ++run) {
     HeightfieldDef def = test::random_heightfield(&random, 40);
     def.two_sided = true;
-    const Twins twins(std::move(def));
+    const GridAndMesh twins(std::move(def));
     for (int n = 0; n < 100; ++n) {
       const auto [from, direction] = random_ray(&random, twins);
-      constexpr double kNone = 1e30, kTolerance = 1e-3;
+      constexpr double kNone = 1e30, kNear = 1e-3;
       double certain = kNone, possible = kNone;  // distances of the first hit
       for (const std::uint32_t i : twins.numbers) {
         Vec3 corner[3];
         twins.grid.get_corners(i, corner);
         const ExactHit exact = exact_hit(corner, from, direction);
         const double t = exact.distance;
-        if (t > kTolerance && exact.least > exact.error) certain = std::min(certain, t);
-        if (t > -kTolerance && exact.least > -exact.error) possible = std::min(possible, t);
+        if (t > kNear && exact.least > exact.error) certain = std::min(certain, t);
+        if (t > -kNear && exact.least > -exact.error) possible = std::min(possible, t);
       }
       const detail::RayEntry found =
           detail::enter(from, direction, twins.heightfield, Transform{}, test::kInfinity);
@@ -328,7 +328,7 @@ TEST(Heightfield, SweepsAndOverlapsAreThoseOfTheMesh) {
   Random random(seed);
   int stopped = 0, touching = 0;
   for (int run = 0; run < 60; ++run) {
-    const Twins twins(test::random_heightfield(&random, run % 3 == 0 ? 40 : 8));
+    const GridAndMesh twins(test::random_heightfield(&random, run % 3 == 0 ? 40 : 8));
     const Vec3 reach = twins.heightfield.data()->half_extents + Vec3{0, 2, 0};
     for (int n = 0; n < 50; ++n) {
       const Vec3 from = random.uniform_in_box(-reach, reach);
@@ -367,7 +367,7 @@ TEST(Heightfield, SweepsAndOverlapsAreThoseOfTheMesh) {
 /// Steep triangles may have no area in the precision of the engine.
 TEST(Heightfield, HugeHeightsAreNoError) {
   const Heightfield steep({3, 3, 0.001_r, 0.001_r, {0, 1e9_r, 0, 0, 0, 0, 0, -1e9_r, 0}, {}, true});
-  const Twins twins(steep.def());
+  const GridAndMesh twins(steep.def());
   const detail::RayEntry down =
       detail::enter({0.0004_r, 5, 0.0001_r}, {0, -1, 0}, steep, Transform{}, test::kInfinity);
   EXPECT_EQ(down.hit, detail::enter({0.0004_r, 5, 0.0001_r}, {0, -1, 0}, twins.mesh, Transform{},

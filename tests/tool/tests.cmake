@@ -1,5 +1,6 @@
 jfpx_add_test(tool_test SOURCES tool/calibrate_test.cpp tool/tool_test.cpp
   LINK jfpx_demos nlohmann_json::nlohmann_json)
+jfpx_add_test(scene_file_test SOURCES tool/scene_file_test.cpp LINK jfpx_command_line)
 jfpx_add_test(cost_fit_test SOURCES
   tool/cost_fit_test.cpp
   ${PROJECT_SOURCE_DIR}/src/tool/cost_fit.cpp
@@ -10,6 +11,7 @@ foreach(suffix IN ITEMS "" "_f64")
   target_compile_definitions(tool_test${suffix} PRIVATE
     "JFPX_TOOL_PATH=\"\\\"$<TARGET_FILE:jfpx_tool${suffix}>\\\"\""
     JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
+  target_compile_definitions(scene_file_test${suffix} PRIVATE JFPX_HAS_ASSIMP=$<BOOL:${JFPX_HAS_ASSIMP}>)
 endforeach()
 
 if(JFPX_HAS_BULLET)

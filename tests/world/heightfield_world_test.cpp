@@ -14,7 +14,7 @@ namespace {
 
 using test::operator""_r;
 
-Heightfield flat(std::uint32_t vertices, Real spacing) {
+Heightfield flat_heightfield(std::uint32_t vertices, Real spacing) {
   return Heightfield({vertices,
                       vertices,
                       spacing,
@@ -23,7 +23,7 @@ Heightfield flat(std::uint32_t vertices, Real spacing) {
                       {},
                       false});
 }
-BodyDef fixed(Shape shape, Real friction) {
+BodyDef fixed_surface(Shape shape, Real friction) {
   BodyDef def;
   def.shape = std::move(shape);
   def.mass = 0;
@@ -32,7 +32,7 @@ BodyDef fixed(Shape shape, Real friction) {
 }
 
 /// A solid that lies on the plane y = 0, and moves in a direction of that plane.
-struct Slider {
+struct GridSlider {
   const char* name;
   Shape shape;
   Real height;
@@ -48,19 +48,19 @@ TEST(HeightfieldWorld, NothingIsStoppedBySeamsOfAFlatHeightfield) {
     corners.push_back({0.4_r * static_cast<Real>(std::cos(angle)), 0.3_r * sign,
                        0.4_r * static_cast<Real>(std::sin(angle))});
   }
-  const Slider sliders[] = {
+  const GridSlider sliders[] = {
       {"ball", Sphere{0.5_r}, 0.5_r},
       {"box", Box{{0.5_r, 0.4_r, 0.3_r}}, 0.4_r},
       {"capsule", Capsule{0.25_r, 0.5_r}, 0.25_r, {half_turn, 0, 0, half_turn}},
       {"hull", centred(Hull(corners)), 0.3_r}};
-  const Heightfield floor = flat(61, 1);
-  for (const Slider& slider : sliders) {
+  const Heightfield floor = flat_heightfield(61, 1);
+  for (const GridSlider& slider : sliders) {
     for (const Real speed : {0.3_r, 1.0_r, 5.0_r, 20.0_r}) {
       for (const Vec3& direction : {Vec3{1, 0, 0}, Vec3{0.6_r, 0, 0.8_r}}) {
         SCOPED_TRACE(std::string(slider.name) + " at " + std::to_string(speed));
         Scene scene;
         scene.sleep.enabled = false;
-        scene.bodies.push_back(fixed(floor, 0));
+        scene.bodies.push_back(fixed_surface(floor, 0));
         BodyDef body;
         body.shape = slider.shape;
         body.orientation = slider.orientation;
@@ -94,7 +94,7 @@ TEST(HeightfieldWorld, BodiesMoveAsOnTheMesh) {
   for (int run = 0; run < 16; ++run) {
     const Heightfield ground(test::random_heightfield(&random, 30));
     Scene scene;
-    scene.bodies.push_back(fixed(ground, 0.5_r));
+    scene.bodies.push_back(fixed_surface(ground, 0.5_r));
     if (run % 2 == 1) {
       scene.bodies[0].kinematic = true;
       scene.bodies[0].angular_velocity = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
@@ -130,9 +130,9 @@ TEST(HeightfieldWorld, BodiesMoveAsOnTheMesh) {
 
 TEST(HeightfieldWorld, ABallFallsThroughAHole) {
   Scene scene;
-  HeightfieldDef def = flat(5, 1).def();
+  HeightfieldDef def = flat_heightfield(5, 1).def();
   def.holes = {0};
-  scene.bodies.push_back(fixed(Heightfield(def), 0));
+  scene.bodies.push_back(fixed_surface(Heightfield(def), 0));
   for (const Real x : {-1.5_r, 1.5_r}) {
     BodyDef ball = test::ball({x, 1, x}, 0.3_r);
     ball.acceleration = {0, -9.81_r, 0};
@@ -147,7 +147,7 @@ TEST(HeightfieldWorld, ABallFallsThroughAHole) {
 
 TEST(HeightfieldWorld, AMovableBodyCannotBeAHeightfield) {
   Scene scene;
-  scene.bodies.push_back(fixed(flat(2, 1), 0));
+  scene.bodies.push_back(fixed_surface(flat_heightfield(2, 1), 0));
   scene.bodies[0].mass = 1;
   try {
     validate(scene);
@@ -165,7 +165,7 @@ TEST(HeightfieldWorld, JsonPreservesHeightfieldsAndNamesTheirFaults) {
   Random random(seed);
   Scene scene;
   for (int n = 0; n < 20; ++n) {
-    scene.bodies.push_back(fixed(Heightfield(test::random_heightfield(&random, 9)), 0.3_r));
+    scene.bodies.push_back(fixed_surface(Heightfield(test::random_heightfield(&random, 9)), 0.3_r));
   }
   EXPECT_EQ(from_json(to_json(scene)), scene);
   const auto complaint = [](const std::string& shape) -> std::string {
@@ -194,7 +194,7 @@ TEST(HeightfieldWorld, SnapshotsPreserveHeightfields) {
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   Scene scene;
-  scene.bodies.push_back(fixed(Heightfield(test::random_heightfield(&random, 30)), 0.3_r));
+  scene.bodies.push_back(fixed_surface(Heightfield(test::random_heightfield(&random, 30)), 0.3_r));
   for (int n = 0; n < 20; ++n) {
     scene.bodies.push_back(test::ball(random.uniform_in_box({-3, 0.2_r, -3}, {3, 2, 3}), 0.2_r));
   }
