@@ -206,13 +206,29 @@ struct SweptBounds {
     }
     reach += 64 * kEpsilon * (sum(sphere.centre) + sum(pose.origin) + reach);
     const Vec3 local = transform_transpose(pose.basis, offset), half{reach, reach, reach};
-    view.visit_overlapping({local - half, local + half}, [&](std::uint32_t index) {
-      Vec3 corner[3];
-      view.get_corners(index, corner);
-      const Vec3 arm = local - corner[0];
-      const Real height = dot(view.normal(index, corner), arm);
-      if (absolute(height) <= reach + 8 * kEpsilon * sum(arm)) visit(mesh, index);
+    if (view.is_grid()) return visit_grid(mesh, {local - half, local + half}, local, reach, visit);
+    view.tree.visit_overlapping({local - half, local + half}, [&](std::uint32_t index) {
+      const detail::MeshTriangle& triangle = view.triangles[index];
+      const Vec3& corner = view.vertices[triangle.vertices[0]];
+      if (is_near_plane(triangle.normal, local - corner, reach)) visit(mesh, index);
     });
+  }
+  /// The same for a heightfield. Not inlined, so that the search of meshes keeps its registers on a
+  /// device; therefore `visit` is copied.
+  template <class Visit>
+  [[gnu::noinline]] JFPX_HD void visit_grid(SubShape mesh, const Aabb& box, Vec3 local, Real reach,
+                                            Visit visit) const {
+    const detail::MeshView& view = sub_shapes.mesh(mesh);
+    view.grid.visit_overlapping(box, [&](std::uint32_t index) {
+      Vec3 corner[3];
+      view.grid.get_corners(index, corner);
+      const detail::TriangleArea area(corner[0], corner[1], corner[2]);
+      if (is_near_plane(area.unit_normal(), local - corner[0], reach)) visit(mesh, index);
+    });
+  }
+  /// @param arm [m], from a point of the plane
+  JFPX_HD static bool is_near_plane(const Vec3& normal, const Vec3& arm, Real reach) {
+    return absolute(dot(normal, arm)) <= reach + 8 * kEpsilon * sum(arm);
   }
   /// [rad], rotation of a mesh in the step.
   JFPX_HD Real turn_of_mesh(SubShape mesh) const {
