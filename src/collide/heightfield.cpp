@@ -22,26 +22,27 @@ constexpr std::uint32_t kMostAlongAxis = 1u << 16;
 /// Triangles have numbers of 32 bits.
 constexpr std::uint64_t kMostVertices = std::uint64_t{1} << 28;
 
-[[noreturn]] void fail(const std::string& name, const std::string& value,
-                       const std::string& range) {
+[[noreturn]] void fail_member(const std::string& name, const std::string& value,
+                              const std::string& range) {
   throw InvalidArgument(name + " is " + value + "; it must be " + range);
 }
 
-void check_axis(const char* count_name, std::uint32_t count, const char* spacing_name,
-                Real spacing) {
+void check_grid_axis(const char* count_name, std::uint32_t count, const char* spacing_name,
+                     Real spacing) {
   if (count < 2 || count > kMostAlongAxis) {
-    fail(count_name, std::to_string(count), "from 2 to " + std::to_string(kMostAlongAxis));
+    fail_member(count_name, std::to_string(count), "from 2 to " + std::to_string(kMostAlongAxis));
   }
   const Real most = 2 * kMaxCoordinate / static_cast<Real>(count - 1);
   if (!(spacing > 0 && spacing <= most)) {
-    fail(spacing_name, std::to_string(spacing),
-         "> 0 and at most " + std::to_string(most) + ", so that coordinates are at most 1e9");
+    fail_member(
+        spacing_name, std::to_string(spacing),
+        "> 0 and at most " + std::to_string(most) + ", so that coordinates are at most 1e9");
   }
 }
 
-void check(const HeightfieldDef& def) {
-  check_axis("columns", def.columns, "spacing_x", def.spacing_x);
-  check_axis("rows", def.rows, "spacing_z", def.spacing_z);
+void check_grid(const HeightfieldDef& def) {
+  check_grid_axis("columns", def.columns, "spacing_x", def.spacing_x);
+  check_grid_axis("rows", def.rows, "spacing_z", def.spacing_z);
   const std::uint64_t count = std::uint64_t{def.rows} * def.columns;
   const std::string product = "rows * columns = " + std::to_string(count);
   if (count > kMostVertices) {
@@ -54,21 +55,21 @@ void check(const HeightfieldDef& def) {
   const auto bad = std::ranges::find_if(
       def.heights, [](Real height) { return !(absolute(height) <= kMaxCoordinate); });
   if (bad != def.heights.end()) {
-    fail("heights[" + std::to_string(bad - def.heights.begin()) + "]", std::to_string(*bad),
-         "between -1e9 and 1e9");
+    fail_member("heights[" + std::to_string(bad - def.heights.begin()) + "]", std::to_string(*bad),
+                "between -1e9 and 1e9");
   }
   for (std::size_t i = 0; i < def.holes.size(); ++i) {
     const std::uint32_t cell = def.holes[i];
     if (cell < count - def.columns && cell % def.columns != def.columns - 1) continue;
-    fail("holes[" + std::to_string(i) + "]", std::to_string(cell),
-         "row * columns + column of a cell; the last row and column have none");
+    fail_member("holes[" + std::to_string(i) + "]", std::to_string(cell),
+                "row * columns + column of a cell; the last row and column have none");
   }
 }
 
 /// Sets the flags of the cells, and the bounds of the tiles.
-class Builder {
+class GridBuilder {
  public:
-  explicit Builder(HeightfieldData* data) : data_(*data), grid_(data->view().grid) {
+  explicit GridBuilder(HeightfieldData* data) : data_(*data), grid_(data->view().grid) {
     data_.cells.assign(grid_.cell_count(), GridView::kMissing);
     grid_.cells = data_.cells.data();
     data_.tiles.resize(grid_.tile_count());
@@ -163,10 +164,10 @@ class Builder {
 
 Heightfield::Heightfield(HeightfieldDef def) {
   if (def == HeightfieldDef{}) return;
-  check(def);
+  check_grid(def);
   auto data = std::make_shared<HeightfieldData>();
   data->def = std::move(def);
-  Builder(data.get()).build();
+  GridBuilder(data.get()).build();
   data_ = std::move(data);
 }
 

@@ -27,7 +27,7 @@ struct FileShape {
   bool is_hull = false, two_sided = false;
 };
 
-[[noreturn]] void fail(std::size_t body, const std::string& what) {
+[[noreturn]] void fail_shape(std::size_t body, const std::string& what) {
   throw InvalidScene("body " + std::to_string(body) + ".shape" + what);
 }
 
@@ -39,25 +39,26 @@ FileShape file_shape(std::size_t body, const Json& json) {
   const bool has_type = type != json.end() && type->is_string();
   shape.is_hull = has_type && *type == "hull";
   if (!shape.is_hull && !(has_type && *type == "triangle_mesh")) {
-    fail(body, ".file: only shapes of type triangle_mesh or hull have a file");
+    fail_shape(body, ".file: only shapes of type triangle_mesh or hull have a file");
   }
   for (const auto& [name, value] : json.items()) {
     if (name == "type") continue;
     if (name == "file") {
-      if (!value.is_string()) fail(body, ".file: must be a string");
+      if (!value.is_string()) fail_shape(body, ".file: must be a string");
       shape.file = value.get<std::string>();
     } else if (name == "scale") {
       const Real scale = value.is_number() ? value.get<Real>() : Real(0);
       if (!(scale > 0 && scale <= kMaxCoordinate)) {
-        fail(body, ".scale: must be a number > 0 and at most 1e9");
+        fail_shape(body, ".scale: must be a number > 0 and at most 1e9");
       }
       shape.scale = scale;
     } else if (name == "two_sided" && !shape.is_hull) {
-      if (!value.is_boolean()) fail(body, ".two_sided: must be a boolean");
+      if (!value.is_boolean()) fail_shape(body, ".two_sided: must be a boolean");
       shape.two_sided = value.get<bool>();
     } else {
-      fail(body, ": has an unknown field \"" + name + "\"; known fields of a shape in a file are " +
-                     (shape.is_hull ? "file, scale, type" : "file, scale, two_sided, type"));
+      fail_shape(body, ": has an unknown field \"" + name +
+                           "\"; known fields of a shape in a file are " +
+                           (shape.is_hull ? "file, scale, type" : "file, scale, two_sided, type"));
     }
   }
   return shape;
@@ -110,7 +111,7 @@ std::vector<FileShape> take_file_shapes(Json* json) {
   return taken;
 }
 
-Scene scene_of(const std::string& path) {
+Scene scene_with_files(const std::string& path) {
   Json json = parse_json(read_file(path));
   const std::vector<FileShape> shapes = take_file_shapes(&json);
   Scene scene = scene_from_value(json);
@@ -121,7 +122,7 @@ Scene scene_of(const std::string& path) {
     try {
       body.shape = reader.read(shape, body.mass > 0);
     } catch (const InvalidArgument& error) {  // by the constructor of the shape
-      fail(shape.body, ".file: " + shape.file + ": " + error.what());
+      fail_shape(shape.body, ".file: " + shape.file + ": " + error.what());
     }
   }
   validate(scene);
@@ -144,7 +145,7 @@ Scene load_scene_file(const std::string& path) {
     return scene;
   }
   try {
-    return scene_of(path);
+    return scene_with_files(path);
   } catch (const InvalidScene& error) {
     throw InvalidScene(path + ": " + error.what());
   }
