@@ -31,6 +31,17 @@ class Preload : public ::testing::Test {
   }
 };
 
+/// Whether the program of environment_program.cpp prints the same with all parts of jfpx.
+void expect_equal_output(const std::string& arguments, const std::string& options = "") {
+  const std::string program = JFPX_ENVIRONMENT_PROGRAM " " + arguments;
+  const ProcessResult stock = run_process(program);
+  ASSERT_EQ(stock.status, 0) << arguments;
+  const ProcessResult ours =
+      run_process(JFPX_TOOL_PATH " preload --minimum-batch 0 " + options + " -- " + program);
+  EXPECT_EQ(ours.status, 0) << arguments;
+  EXPECT_EQ(ours.output, stock.output) << arguments << options;
+}
+
 constexpr const char* kPrecision = sizeof(Real) == 4 ? "Bullet in float" : "Bullet in double";
 
 TEST_F(Preload, KeepsTheHashAndRunsBatches) {
@@ -193,6 +204,10 @@ TEST_F(Preload, LeavesAnUnsupportedBulletUnchanged) {
                   " " JFPX_TOOL_PATH " preload --summary -- " JFPX_STOCK_PROGRAM " 30 2>&1");
   EXPECT_THAT(result.output, HasSubstr(alone("30").output));
   EXPECT_THAT(result.output, HasSubstr("left to Bullet: " + library + " is neither"));
+}
+
+TEST_F(Preload, HoldsNoMemoryOfBulletsAllocatorBetweenWorlds) {
+  for (const char* options : {"", "--threads 2"}) expect_equal_output("allocators", options);
 }
 
 }  // namespace

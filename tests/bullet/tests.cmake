@@ -122,6 +122,8 @@ endif()
 if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
   jfpx_add_executable(bullet_stock_program SOURCES bullet/stock_program.cpp
     LINK jfpx_bullet3rd Threads::Threads)
+  jfpx_add_executable(bullet_environment_program SOURCES bullet/environment_program.cpp
+    LINK jfpx_bullet3rd Threads::Threads)
   jfpx_add_test(bullet_preload_test SOURCES bullet/preload_test.cpp)
   add_library(vtable_library SHARED bullet/vtable_library.cpp)
   target_include_directories(vtable_library PRIVATE ${PROJECT_SOURCE_DIR})
@@ -137,10 +139,12 @@ if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
     set(collision ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
     list(FILTER collision INCLUDE REGEX "BulletCollision")
     jfpx_test_runs(bullet_preload_test${suffix}
-      jfpx_tool jfpx_tool_f64 jfpx_bullet_preload bullet_stock_program bullet_stock_program_f64)
+      jfpx_tool jfpx_tool_f64 jfpx_bullet_preload bullet_stock_program bullet_stock_program_f64
+      bullet_environment_program bullet_environment_program_f64)
     target_compile_definitions(bullet_preload_test${suffix} PRIVATE
       JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
       JFPX_STOCK_PROGRAM="$<TARGET_FILE:bullet_stock_program${suffix}>"
+      JFPX_ENVIRONMENT_PROGRAM="$<TARGET_FILE:bullet_environment_program${suffix}>"
       JFPX_OTHER_STOCK_PROGRAM="$<TARGET_FILE:bullet_stock_program${other}>"
       JFPX_BULLET_COLLISION="${collision}")
   endforeach()

@@ -9,7 +9,9 @@
 #include "src/bullet/world/aabb_update.hpp"
 
 #include <atomic>
+#include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -19,8 +21,24 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-/// The state of Bullet's solver that persists between groups.
+/// The state of Bullet's solver that persists between groups, and its arrays.
 struct SolverState : btSequentialImpulseConstraintSolver {
+  /// The memory of the arrays is Bullet's, whose allocator the program may replace or reset when
+  /// its solver does not exist. It must therefore belong to the program's solver between groups.
+  static void swap_arrays(btSequentialImpulseConstraintSolver* a,
+                          btSequentialImpulseConstraintSolver* b) {
+    const auto swap = [&](auto member) { swap_bytes(&(a->*member), &(b->*member)); };
+    swap(&SolverState::m_tmpSolverBodyPool);
+    swap(&SolverState::m_tmpSolverContactConstraintPool);
+    swap(&SolverState::m_tmpSolverNonContactConstraintPool);
+    swap(&SolverState::m_tmpSolverContactFrictionConstraintPool);
+    swap(&SolverState::m_tmpSolverContactRollingFrictionConstraintPool);
+    swap(&SolverState::m_orderTmpConstraintPool);
+    swap(&SolverState::m_orderNonContactConstraintPool);
+    swap(&SolverState::m_orderFrictionConstraintPool);
+    swap(&SolverState::m_tmpConstraintSizesPool);
+    swap(&SolverState::m_kinematicBodyUniqueIdToSolverBodyTable);
+  }
   static void copy(const btSequentialImpulseConstraintSolver& from,
                    btSequentialImpulseConstraintSolver* to) {
     const auto field = [&](auto member) { to->*member = from.*member; };
@@ -32,21 +50,36 @@ struct SolverState : btSequentialImpulseConstraintSolver {
     field(&SolverState::m_btSeed2);
     field(&SolverState::m_analyticsData);
   }
+
+ private:
+  /// btAlignedObjectArray has no function that exchanges the memory of two arrays.
+  template <class Item>
+  static void swap_bytes(btAlignedObjectArray<Item>* a, btAlignedObjectArray<Item>* b) {
+    std::byte kept[sizeof *a];
+    std::memcpy(kept, static_cast<const void*>(a), sizeof kept);
+    std::memcpy(static_cast<void*>(a), static_cast<const void*>(b), sizeof kept);
+    std::memcpy(static_cast<void*>(b), kept, sizeof kept);
+  }
 };
 
-std::unique_ptr<ConstraintSolver> make_solver() {
+/// Is a class of its own, because operator new of ConstraintSolver calls Bullet's allocator.
+struct PooledSolver {
+  ConstraintSolver solver;
+};
+
+std::unique_ptr<PooledSolver> make_solver() {
   const PreloadOptions& from = preload_options();
   ConstraintSolverOptions options;
   options.backend = from.backend;
   options.threads = from.threads;
   if (from.minimum_batch) options.minimum_batch = *from.minimum_batch;
-  return std::make_unique<ConstraintSolver>(options);
+  return std::unique_ptr<PooledSolver>(new PooledSolver{ConstraintSolver(options)});
 }
 
 /// Never destroyed, like the counters below, because threads may solve, and the summary is written,
 /// during process exit.
-ObjectPool<ConstraintSolver>& pool() {
-  static auto& made = *new ObjectPool<ConstraintSolver>(make_solver);
+ObjectPool<PooledSolver>& pool() {
+  static auto& made = *new ObjectPool<PooledSolver>(make_solver);
   return made;
 }
 
@@ -68,8 +101,8 @@ std::size_t minimum_batch() {
 
 ConstraintSolverStats sum_of_stats() {
   ConstraintSolverStats sum;
-  pool().for_each_idle([&](const ConstraintSolver& solver) {
-    const ConstraintSolverStats& stats = solver.stats();
+  pool().for_each_idle([&](const PooledSolver& pooled) {
+    const ConstraintSolverStats& stats = pooled.solver.stats();
     sum.groups += stats.groups;
     sum.on_device += stats.on_device;
     sum.contacts += stats.contacts;
@@ -82,15 +115,19 @@ ConstraintSolverStats sum_of_stats() {
   return sum;
 }
 
-/// Copies the state from the program's solver to jfpx's solver, and back at the end of its
-/// lifetime, even after an exception.
+/// Lends the arrays and the state of the program's solver to jfpx's solver for its lifetime, even
+/// after an exception.
 class SolverStateTransfer {
  public:
   SolverStateTransfer(btSequentialImpulseConstraintSolver* original, ConstraintSolver* solver)
       : original_(original), solver_(solver) {
+    SolverState::swap_arrays(original_, solver_);
     SolverState::copy(*original_, solver_);
   }
-  ~SolverStateTransfer() { SolverState::copy(*solver_, original_); }
+  ~SolverStateTransfer() {
+    SolverState::copy(*solver_, original_);
+    SolverState::swap_arrays(original_, solver_);
+  }
   SolverStateTransfer(const SolverStateTransfer&) = delete;
   SolverStateTransfer& operator=(const SolverStateTransfer&) = delete;
 
@@ -137,15 +174,15 @@ JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count
     g_small.fetch_add(1, std::memory_order_relaxed);
     return false;
   }
-  const ObjectPool<ConstraintSolver>::Handle ours(pool());
+  const ObjectPool<PooledSolver>::Handle ours(pool());
   if (ours.get() == nullptr) return false;
-  const SolverStateTransfer transfer(own, ours.get());
-  ours.get()->solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
-                         reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
-                         reinterpret_cast<btTypedConstraint**>(joints), joint_count,
-                         *static_cast<const btContactSolverInfo*>(info),
-                         static_cast<btIDebugDraw*>(drawer),
-                         static_cast<btDispatcher*>(dispatcher));
+  ConstraintSolver& our_solver = ours.get()->solver;
+  const SolverStateTransfer transfer(own, &our_solver);
+  our_solver.solveGroup(reinterpret_cast<btCollisionObject**>(bodies), body_count,
+                        reinterpret_cast<btPersistentManifold**>(manifolds), manifold_count,
+                        reinterpret_cast<btTypedConstraint**>(joints), joint_count,
+                        *static_cast<const btContactSolverInfo*>(info),
+                        static_cast<btIDebugDraw*>(drawer), static_cast<btDispatcher*>(dispatcher));
   return true;
 }
 
