@@ -210,5 +210,20 @@ TEST_F(Preload, HoldsNoMemoryOfBulletsAllocatorBetweenWorlds) {
   for (const char* options : {"", "--threads 2"}) expect_equal_output("allocators", options);
 }
 
+TEST_F(Preload, RunsWithFloatingPointTraps) {
+  for (const char* options : {"", "--threads 2"}) {
+    expect_equal_output("traps 300", options);
+    expect_equal_output("flags 300", options);
+  }
+}
+
+TEST_F(Preload, KeepsTheHashInEveryRoundingMode) {
+  expect_equal_output("rounding 200");
+  const ProcessResult ours = jfpx_command(
+      "preload --summary --minimum-batch 0 -- " JFPX_ENVIRONMENT_PROGRAM " rounding 100 2>&1");
+  EXPECT_THAT(ours.output, HasSubstr("left to Bullet: 180 (rounding mode)\n"));
+  EXPECT_THAT(ours.output, ContainsRegex("groups left to Bullet: [1-9][0-9]* \\(rounding mode\\)"));
+}
+
 }  // namespace
 }  // namespace jfpx

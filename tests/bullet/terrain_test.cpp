@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cfenv>
 #include <set>
 #include <utility>
 
@@ -231,6 +232,59 @@ TEST(MovingMeshes, OfGImpactFallAmongBodiesAsInStockBullet) {
     ASSERT_TRUE(twins.step(100)) << threads << " threads";
     // Steps in which fewer than two spheres have pairs are left to Bullet.
     EXPECT_GT(twins.stats().batches, 0u);
+  }
+}
+
+/// Restores the floating-point environment at the end of a test.
+class EnvironmentKept {
+ public:
+  EnvironmentKept() { std::fegetenv(&kept_); }
+  ~EnvironmentKept() { std::fesetenv(&kept_); }
+  EnvironmentKept(const EnvironmentKept&) = delete;
+  EnvironmentKept& operator=(const EnvironmentKept&) = delete;
+
+ private:
+  std::fenv_t kept_{};
+};
+
+constexpr int kTraps = FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW;
+
+#if defined(__x86_64__)  // few ARM64 processors have traps
+TEST(FloatingPointEnvironment, MayHaveTrapsThatBulletDoesNotRaise) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Hills hills(seed);
+  for (const unsigned threads : {1u, 3u}) {
+    Twins twins(all_parts(threads, {.minimum_batch = 0}, {.minimum_batch = 0}));
+    twins.both([&](BulletWorld& w) { add_landscape(w, Terrain::triangles, hills, seed, 300); });
+    const EnvironmentKept kept;
+    std::feclearexcept(FE_ALL_EXCEPT);
+    feenableexcept(kTraps);
+    for (int step = 0; step < 60; ++step) {
+      ASSERT_TRUE(twins.step()) << threads << " threads";
+      ASSERT_EQ(fegetexcept(), kTraps);
+      ASSERT_EQ(std::fetestexcept(kTraps), 0);
+    }
+    EXPECT_EQ(twins.stats().batches, 60u);
+  }
+}
+#endif
+
+TEST(FloatingPointEnvironment, WithAnotherRoundingModeIsLeftToBullet) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Hills hills(seed);
+  for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
+    Twins twins(all_parts(3, {.minimum_batch = 0}, {.minimum_batch = 0}));
+    twins.both([&](BulletWorld& w) { add_landscape(w, Terrain::triangles, hills, seed, 300); });
+    ASSERT_TRUE(twins.step(10));
+    const EnvironmentKept kept;
+    std::fesetround(mode);
+    ASSERT_TRUE(twins.step(50)) << mode;
+    EXPECT_EQ(std::fegetround(), mode);
+    EXPECT_EQ(twins.stats().fallbacks[static_cast<std::size_t>(Fallback::rounding)], 50u);
+    const auto& solver = dynamic_cast<ConstraintSolver&>(*twins.ours().solver);
+    EXPECT_GT(solver.stats().fallbacks[static_cast<std::size_t>(SolverFallback::rounding)], 0u);
   }
 }
 

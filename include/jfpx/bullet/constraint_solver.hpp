@@ -41,8 +41,9 @@ enum class SolverFallback : std::uint8_t {
   measured,       ///< few rows are independent, and Bullet's own code has measured faster, or is
                   ///< being measured
   thread_safe,  ///< Bullet has BT_THREADSAFE, and its solver treats a body of the group differently
+  rounding,     ///< the rounding mode of the thread is not to nearest
 };
-inline constexpr std::size_t kSolverFallbacks = 9;
+inline constexpr std::size_t kSolverFallbacks = 10;
 
 /// Returns a short text for a table, for example "small group".
 JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;

@@ -22,8 +22,9 @@ enum class Fallback : std::uint8_t {
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called by a callback inside another dispatch of this dispatcher
   out_of_memory,    ///< see DispatchStats::failure; the next dispatch tries again
+  rounding,         ///< the rounding mode of the thread is not to nearest
 };
-inline constexpr std::size_t kFallbackCount = 8;
+inline constexpr std::size_t kFallbackCount = 9;
 
 /// A short text for a table, for example "small batch".
 JFPX_API std::string_view to_string(Fallback fallback) noexcept;

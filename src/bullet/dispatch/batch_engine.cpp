@@ -4,6 +4,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/floating_point.hpp"
 #include "src/bullet/dispatch/pair_check.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/failure.hpp"
@@ -91,6 +92,7 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
                                           std::size_t pairs, const btDispatcherInfo& info) const {
   if (running_) return Fallback::nested;
   if (pairs == 0 || pairs < minimum_batch_) return Fallback::small_batch;
+  if (!rounds_to_nearest()) return Fallback::rounding;
   if (dispatcher.getNearCallback() != btNearCallback(btCollisionDispatcher::defaultNearCallback)) {
     return Fallback::near_callback;
   }
@@ -104,6 +106,7 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
 /// find_touching() handles failures of a device.
 bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                           btOverlappingPairCache& cache, Fallback* fallback) {
+  const TrapsMasked masked;
   try {
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
@@ -209,7 +212,10 @@ void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlapp
                                 .runs_algorithms = !verify_,
                                 .triangle_algorithms = triangle_algorithms_,
                                 .ignores_separated = TriangleAlgorithms::ignores_separated()};
-  add(unordered_commit_.run(dispatch, touching_, pool_));
+  {
+    const TrapsMasked masked;
+    add(unordered_commit_.run(dispatch, touching_, pool_));
+  }
   if (verify_) check_convex(dispatcher, info);
   unordered_commit_.sort_remaining(pairs_, info.m_deterministicOverlappingPairs);
   visit_remaining(dispatcher, cache, info);

@@ -71,6 +71,8 @@ std::string_view to_string(Fallback fallback) noexcept {
       return "nested dispatch";
     case Fallback::out_of_memory:
       return "out of memory";
+    case Fallback::rounding:
+      return "rounding mode";
   }
   return "unknown";
 }

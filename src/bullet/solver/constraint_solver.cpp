@@ -2,6 +2,7 @@
 /// files of the stages.
 #include <jfpx/error.hpp>
 
+#include "src/base/floating_point.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 #include "src/bullet/solver/constraint_solver_test_access.hpp"
 #include "src/bullet/solver/joint_rows.hpp"
@@ -163,7 +164,10 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
   std::optional<SolverFallback> reason = impl_->fallback_reason(group);
   const bool chooses = !reason && impl_->may_choose && impl_->minimum_batch > 0;
   if (chooses && impl_->choice.leaves_to_bullet(group.size())) reason = SolverFallback::measured;
-  if (!reason) reason = impl_->solve(group);
+  if (!reason) {
+    const TrapsMasked masked;
+    reason = impl_->solve(group);
+  }
   btScalar result = 0;
   if (reason) {
     ++impl_->stats.fallbacks[static_cast<std::size_t>(*reason)];
@@ -193,7 +197,8 @@ std::string_view to_string(SolverFallback fallback) noexcept {
                                                          "not finite",
                                                          "out of memory",
                                                          "measured",
-                                                         "body with BT_THREADSAFE"};
+                                                         "body with BT_THREADSAFE",
+                                                         "rounding mode"};
   const auto i = static_cast<std::size_t>(fallback);
   return i < kSolverFallbacks ? kTexts[i] : "unknown";
 }

@@ -1,4 +1,5 @@
 /// Rules by which a group falls back to Bullet's own solver.
+#include "src/base/floating_point.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 #include "src/bullet/solver/joint_rows.hpp"
 #include "src/bullet/thread_safe_library.hpp"
@@ -64,6 +65,7 @@ bool ConstraintSolver::Impl::depends_on_thread_safety(
 std::optional<SolverFallback> ConstraintSolver::Impl::fallback_reason(
     std::span<btPersistentManifold* const> manifolds) const {
   if (manifolds.size() < minimum_batch) return SolverFallback::small;
+  if (!rounds_to_nearest()) return SolverFallback::rounding;
   if (steps() != own_steps) return SolverFallback::overridden;
   if ((info->m_solverMode & kUnsupportedModes) != 0 || info->m_numIterations <= 0 ||
       max_iterations() > kMaxIterations) {

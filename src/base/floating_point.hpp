@@ -1,0 +1,49 @@
+/// Floating-point environment of the calling thread.
+#pragma once
+
+#include <jfpx/config.hpp>
+
+#include <cfenv>
+
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// Masks the traps of floating-point exceptions during its lifetime, and then restores the traps
+/// and status flags. Idle vector lanes and comparisons with NaN raise exceptions that have no
+/// effect on results.
+class TrapsMasked {
+ public:
+#if defined(__x86_64__)
+  // Only the x87 unit has another register, and no code of jfpx uses it.
+  TrapsMasked() noexcept : kept_(_mm_getcsr()) { _mm_setcsr(kept_ | _MM_MASK_MASK); }
+  ~TrapsMasked() { _mm_setcsr(kept_); }
+#else
+  TrapsMasked() noexcept { std::feholdexcept(&kept_); }
+  ~TrapsMasked() { std::fesetenv(&kept_); }
+#endif
+  TrapsMasked(const TrapsMasked&) = delete;
+  TrapsMasked& operator=(const TrapsMasked&) = delete;
+
+ private:
+#if defined(__x86_64__)
+  unsigned kept_;
+#else
+  std::fenv_t kept_{};
+#endif
+};
+
+/// Whether results are rounded to the nearest value, the default.
+inline bool rounds_to_nearest() noexcept {
+#if defined(__x86_64__)
+  return (_mm_getcsr() & _MM_ROUND_MASK) == _MM_ROUND_NEAREST;
+#else
+  return std::fegetround() == FE_TONEAREST;
+#endif
+}
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
