@@ -5,8 +5,10 @@
 #include "src/base/thread_pool.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/options.hpp"
+#include "src/tool/program_file.hpp"
 
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -41,8 +43,32 @@ std::string find_library() {
   return path;
 }
 
-void set_environment(const PreloadOptions& options) {
+/// The library of AddressSanitizer, which must be the first that a program loads; empty if the
+/// program is not linked with it.
+std::string address_sanitizer_of(const ProgramFile& program) {
+  for (const std::string& library : program.libraries) {
+    for (const char* start : {"libasan.so", "libclang_rt.asan", "libhwasan.so"}) {
+      if (library.starts_with(start)) return library;
+    }
+  }
+  return {};
+}
+
+/// Why jfpx cannot be loaded into the program; empty if it can.
+std::string obstacle_of(const ProgramFile& program) {
+  if (!program.is_of_this_machine) return "is not a program of the architecture of this command";
+  if (!program.loads_libraries) return "is statically linked";
+  if (program.ignores_preload) {
+    return "runs with the rights of another user or group, so that LD_PRELOAD is ignored";
+  }
+  return {};
+}
+
+void set_environment(const PreloadOptions& options, const ProgramFile& program) {
   std::string preload = find_library();
+  if (const std::string first = address_sanitizer_of(program); !first.empty()) {
+    preload = first + ":" + preload;
+  }
   if (const char* others = std::getenv("LD_PRELOAD"); others != nullptr && *others != '\0') {
     preload += std::string(":") + others;
   }
@@ -64,7 +90,12 @@ void set_environment(const PreloadOptions& options) {
 [[noreturn]] void start(const PreloadOptions& options) {
   // Checked here as an error; inside the program, only a warning would be possible.
   if (options.backend == "cuda") (void)make_sphere_collider({.backend = Backend::cuda});
-  set_environment(options);
+  const ProgramFile program = read_program_file(options.command[0]);
+  if (const std::string obstacle = obstacle_of(program); !obstacle.empty()) {
+    std::fprintf(stderr, "jfpx preload: %s %s; it runs without jfpx\n", options.command[0].c_str(),
+                 obstacle.c_str());
+  }
+  set_environment(options, program);
   std::vector<std::string> command = options.command;
   std::vector<char*> arguments;
   arguments.reserve(command.size() + 1);

@@ -5,6 +5,7 @@
 ///     flags SPHERES          prints whether a step sets flags of floating-point exceptions
 ///     rounding SPHERES       one world for each rounding mode
 ///     stack BYTES SPHERES    a thread with a stack of this size
+///     name                   prints the name of a type, as a statically linked Bullet contains it
 ///     threads WORLDS         worlds that step at the same time; prints the number of threads
 ///
 /// Prints hashes of the final positions.
@@ -85,6 +86,8 @@ void run_on_stack(std::size_t bytes, int spheres) {
   print(s_hash);
 }
 
+const char kTypeName[] = "21btCollisionDispatcher";
+
 long count_threads() {
   using Folder = std::filesystem::directory_iterator;
   return std::distance(Folder("/proc/self/task"), Folder());
@@ -132,6 +135,8 @@ int main(int argc, char** argv) {
     }
   } else if (mode == "stack") {
     run_on_stack(static_cast<std::size_t>(first), second);
+  } else if (mode == "name") {
+    std::puts(kTypeName);
   } else if (mode == "threads") {
     run_at_the_same_time(first);
   } else {

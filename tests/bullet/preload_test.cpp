@@ -172,7 +172,7 @@ TEST_F(Preload, LeavesProgramsWithoutBulletUntouched) {
 
 TEST_F(Preload, ReportsThatBulletWasNotUsed) {
   const ProcessResult result = jfpx_command("preload --summary -- " JFPX_STOCK_PROGRAM " 2>&1");
-  EXPECT_THAT(result.output, HasSubstr(": Bullet was not used\n"));
+  EXPECT_THAT(result.output, HasSubstr(": no shared library of Bullet was used\n"));
 }
 
 TEST_F(Preload, KeepsOtherPreloadedLibraries) {
@@ -223,6 +223,88 @@ TEST_F(Preload, KeepsTheHashInEveryRoundingMode) {
       "preload --summary --minimum-batch 0 -- " JFPX_ENVIRONMENT_PROGRAM " rounding 100 2>&1");
   EXPECT_THAT(ours.output, HasSubstr("left to Bullet: 180 (rounding mode)\n"));
   EXPECT_THAT(ours.output, ContainsRegex("groups left to Bullet: [1-9][0-9]* \\(rounding mode\\)"));
+}
+
+TEST_F(Preload, ReportsUnknownPartsAndIgnoresThem) {
+  const std::string command =
+      JFPX_TOOL_PATH " preload --summary -- " JFPX_STOCK_PROGRAM " 300 2>&1";
+  const ProcessResult unknown = run_process("JFPX_PRELOAD_PARTS=solver,wheels " + command);
+  EXPECT_THAT(
+      unknown.output,
+      HasSubstr("jfpx preload: JFPX_PRELOAD_PARTS is \"solver,wheels\"; it must be a list of "
+                "dispatcher, solver and world. The value is ignored.\n"));
+  EXPECT_THAT(unknown.output, HasSubstr("60 dispatches"));
+  EXPECT_THAT(unknown.output, HasSubstr("60 AABB updates"));
+}
+
+TEST_F(Preload, ReportsThatTheSummaryOfAProgramIsEmpty) {
+  const std::string preload = "preload --summary -- ";
+  // It closes stderr at exit.
+  EXPECT_EQ(jfpx_command(preload + "ls /dev/null 2>&1").output,
+            "/dev/null\njfpx preload: ls: no shared library of Bullet was used\n");
+  EXPECT_THAT(jfpx_command(preload + JFPX_ENVIRONMENT_PROGRAM " name 2>&1").output,
+              HasSubstr(": left to Bullet, which is statically linked in the program\n"));
+}
+
+TEST_F(Preload, ReportsProgramsIntoWhichItCannotBeLoaded) {
+  const test::TemporaryFolder folder;
+  const std::string echo = folder.file("echo");
+  if (run_process("cp /bin/echo " + echo + " && chown 65534 " + echo + " && chmod 4755 " + echo)
+          .status == 0) {
+    EXPECT_EQ(jfpx_command("preload -- " + echo + " x 2>&1").output,
+              "jfpx preload: " + echo +
+                  " runs with the rights of another user or group, so that LD_PRELOAD is ignored; "
+                  "it runs without jfpx\nx\n");
+  }
+  const std::string is_static = "head -c 4 /sbin/ldconfig | grep -q ELF && ! ldd /sbin/ldconfig";
+  if (run_process("(" + is_static + ") > " + folder.file("output") + " 2>&1").status == 0) {
+    EXPECT_THAT(jfpx_command("preload -- /sbin/ldconfig --version 2>&1").output,
+                ContainsRegex("^jfpx preload: /sbin/ldconfig is statically linked; it runs without "
+                              "jfpx\nldconfig"));
+  }
+}
+
+TEST_F(Preload, ReportsBulletInAnotherPrecisionUnderAKnownName) {
+  if (!JFPX_HAS_BOTH_PRECISIONS) GTEST_SKIP() << "built in one precision";
+  // As a program may have built it: the name of the library does not contain the precision.
+  const test::TemporaryFolder folder;
+  const auto renamed = [&](const std::string& path) {
+    std::string name = path.substr(path.rfind('/') + 1);
+    const std::size_t suffix = name.find("-float64");
+    if (suffix == std::string::npos) {
+      name.insert(name.find(".so"), "-float64");
+    } else {
+      name.erase(suffix, 8);
+    }
+    return folder.file(name);
+  };
+  std::string preload;
+  for (const std::string part : {JFPX_BULLET_COLLISION, JFPX_BULLET_DYNAMICS}) {
+    const std::string real = run_process("readlink -f " + part + " | xargs echo -n").output;
+    ASSERT_EQ(run_process("cp " + real + " " + renamed(real)).status, 0);
+    preload += (preload.empty() ? "" : ":") + renamed(real);
+  }
+  const ProcessResult result =
+      run_process("LD_PRELOAD=" + preload +
+                  " " JFPX_TOOL_PATH " preload --summary -- " JFPX_STOCK_PROGRAM " 30 2>&1");
+  EXPECT_THAT(result.output, HasSubstr(alone("30").output));
+  EXPECT_THAT(result.output,
+              ContainsRegex(sizeof(Real) == 4 ? ": left to Bullet: [^ ]+ is Bullet in float, and "
+                                                "jfpx was built with Bullet in double under "
+                                              : ": left to Bullet: [^ ]+ is Bullet in double, and "
+                                                "jfpx was built with Bullet in float under "));
+}
+
+TEST_F(Preload, StartsProgramsWithAddressSanitizer) {
+#if defined(JFPX_ASAN_PROGRAM)
+  const ProcessResult result = run_process("env -u ASAN_OPTIONS " JFPX_TOOL_PATH
+                                           " preload --summary -- " JFPX_ASAN_PROGRAM " 300 2>&1");
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.output, HasSubstr(alone("300").output));
+  EXPECT_THAT(result.output, HasSubstr("60 AABB updates"));
+#else
+  GTEST_SKIP() << "no program with AddressSanitizer";
+#endif
 }
 
 }  // namespace

@@ -124,6 +124,17 @@ if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
     LINK jfpx_bullet3rd Threads::Threads)
   jfpx_add_executable(bullet_environment_program SOURCES bullet/environment_program.cpp
     LINK jfpx_bullet3rd Threads::Threads)
+  # A program as its developers may build it. A sanitizer build of this project is one, too.
+  set(with_asan "")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+    jfpx_add_executable(bullet_asan_program SOURCES bullet/stock_program.cpp
+      LINK jfpx_bullet3rd Threads::Threads)
+    foreach(target IN ITEMS bullet_asan_program bullet_asan_program_f64)
+      target_compile_options(${target} PRIVATE -fsanitize=address)
+      target_link_options(${target} PRIVATE -fsanitize=address)
+    endforeach()
+    set(with_asan bullet_asan_program bullet_asan_program_f64)
+  endif()
   jfpx_add_test(bullet_preload_test SOURCES bullet/preload_test.cpp)
   add_library(vtable_library SHARED bullet/vtable_library.cpp)
   target_include_directories(vtable_library PRIVATE ${PROJECT_SOURCE_DIR})
@@ -137,16 +148,22 @@ if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
       set(precision F64)
     endif()
     set(collision ${JFPX_BULLET_${precision}_LINK_LIBRARIES})
+    set(dynamics ${collision})
     list(FILTER collision INCLUDE REGEX "BulletCollision")
+    list(FILTER dynamics INCLUDE REGEX "BulletDynamics")
     jfpx_test_runs(bullet_preload_test${suffix}
       jfpx_tool jfpx_tool_f64 jfpx_bullet_preload bullet_stock_program bullet_stock_program_f64
-      bullet_environment_program bullet_environment_program_f64)
+      bullet_environment_program bullet_environment_program_f64 ${with_asan})
+    if(with_asan)
+      target_compile_definitions(bullet_preload_test${suffix} PRIVATE
+        JFPX_ASAN_PROGRAM="$<TARGET_FILE:bullet_asan_program${suffix}>")
+    endif()
     target_compile_definitions(bullet_preload_test${suffix} PRIVATE
       JFPX_TOOL_PATH="$<TARGET_FILE:jfpx_tool${suffix}>"
       JFPX_STOCK_PROGRAM="$<TARGET_FILE:bullet_stock_program${suffix}>"
       JFPX_ENVIRONMENT_PROGRAM="$<TARGET_FILE:bullet_environment_program${suffix}>"
       JFPX_OTHER_STOCK_PROGRAM="$<TARGET_FILE:bullet_stock_program${other}>"
-      JFPX_BULLET_COLLISION="${collision}")
+      JFPX_BULLET_COLLISION="${collision}" JFPX_BULLET_DYNAMICS="${dynamics}")
   endforeach()
 endif()
 

@@ -7,6 +7,7 @@
 /// is loaded into programs without them. The first call of one of the functions by Bullet loads the
 /// engine of the matching precision.
 #include "src/bullet/preload/preload_engine.hpp"
+#include "src/bullet/preload/static_bullet.hpp"
 #include "src/bullet/preload/vtable.hpp"
 
 #include <cerrno>
@@ -14,8 +15,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
+#include <fcntl.h>
 #include <initializer_list>
 #include <pthread.h>
+#include <unistd.h>
 
 #define JFPX_DISPATCH                                           \
   "_ZN21btCollisionDispatcher25dispatchAllCollisionPairsEP22bt" \
@@ -77,7 +80,8 @@ Function g_update_boxes{.symbol = JFPX_UPDATE_BOXES,
 
 pthread_mutex_t g_mutex = PTHREAD_MUTEX_INITIALIZER;
 PrintSummary g_print_summary = nullptr;
-char g_reason[512] = "Bullet was not used";
+char g_reason[512] = "";   ///< why no engine was loaded; empty if no function was called
+FILE* g_stderr = nullptr;  ///< a copy of stderr, which programs may close before the summary
 thread_local Function* t_function = nullptr;
 thread_local const void* t_caller = nullptr;
 
@@ -86,18 +90,47 @@ const char* file_name(const char* path) {
   return slash == nullptr ? path : slash + 1;
 }
 
-/// Whether JFPX_PRELOAD_PARTS lists the part or is not set.
-bool is_enabled(const char* part) {
-  const char* at = std::getenv("JFPX_PRELOAD_PARTS");
-  if (at == nullptr || *at == '\0') return true;
-  const std::size_t length = std::strlen(part);
-  for (;; ++at) {
-    const char* end = std::strchr(at, ',');
-    const std::size_t item = end == nullptr ? std::strlen(at) : static_cast<std::size_t>(end - at);
-    if (item == length && std::strncmp(at, part, length) == 0) return true;
-    if (end == nullptr) return false;
-    at = end;
+/// Calls visit(item, length) for the items of a list that is separated by commas, until it returns
+/// true. @return whether it has
+template <class Visit>
+bool any_item(const char* list, const Visit& visit) {
+  for (const char* at = list;; ++at) {
+    const std::size_t length = std::strcspn(at, ",");
+    if (visit(at, length)) return true;
+    at += length;
+    if (*at == '\0') return false;
   }
+}
+
+/// JFPX_PRELOAD_PARTS; null if it is not set or names an unknown part, which is reported once.
+const char* enabled_parts() {
+  static bool s_is_reported = false;  // g_mutex is locked
+  const char* const list = std::getenv("JFPX_PRELOAD_PARTS");
+  if (list == nullptr || *list == '\0') return nullptr;
+  const bool is_unknown = any_item(list, [](const char* item, std::size_t length) {
+    for (const Function* known : {&g_dispatch, &g_solve, &g_update_boxes}) {
+      if (std::strlen(known->part) == length && std::strncmp(item, known->part, length) == 0) {
+        return false;
+      }
+    }
+    return true;
+  });
+  if (!is_unknown) return list;
+  if (!s_is_reported) {
+    std::fprintf(stderr,
+                 "jfpx preload: JFPX_PRELOAD_PARTS is \"%s\"; it must be a list of dispatcher, "
+                 "solver and world. The value is ignored.\n",
+                 list);
+  }
+  s_is_reported = true;
+  return nullptr;
+}
+
+bool is_enabled(const char* part) {
+  const char* const list = enabled_parts();
+  return list == nullptr || any_item(list, [part](const char* item, std::size_t length) {
+           return std::strlen(part) == length && std::strncmp(item, part, length) == 0;
+         });
 }
 
 /// The definition that the caller's library would use without this library, if it is private.
@@ -133,7 +166,32 @@ void replace_in_vtables(const void* caller) {
   }
   dlerror();  // clears the errors of missing symbols
 }
-__attribute__((constructor)) void start() { replace_in_vtables(nullptr); }
+bool wants_summary() {
+  const char* setting = std::getenv("JFPX_PRELOAD_SUMMARY");
+  return setting != nullptr && *setting != '\0' && std::strcmp(setting, "0") != 0;
+}
+
+__attribute__((constructor)) void start() {
+  replace_in_vtables(nullptr);
+  // A high number, so that files that the program opens have the numbers that they have without.
+  constexpr int kLowestCopy = 200;
+  if (!wants_summary()) return;
+  const int copy = fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, kLowestCopy);
+  if (copy >= 0) g_stderr = fdopen(copy, "w");
+}
+
+/// Whether the library of Bullet is of the precision that its name denotes. Only the libraries of
+/// Debian have a name for each precision.
+bool has_precision_of_name(const char* path, bool is_double) {
+  void* const library = dlopen(path, RTLD_LAZY | RTLD_NOLOAD);
+  if (library == nullptr) return true;
+  constexpr const char* kFunctions[] = {"_ZN15btConvex2dShape9setMarginEf",
+                                        "_ZN15btConvex2dShape9setMarginEd"};
+  const bool has_other = dlsym(library, kFunctions[is_double ? 0 : 1]) != nullptr;
+  dlclose(library);
+  dlerror();
+  return !has_other;
+}
 
 /// The engine for the precision of the Bullet library that contains the function. Null, with a
 /// reason in g_reason, if the engines were compiled for another version, whose class layout may
@@ -142,8 +200,17 @@ const char* engine_for(const Function& function, const void* address) {
   Dl_info info;
   if (dladdr(address, &info) == 0) return nullptr;
   const char* library = file_name(info.dli_fname);
-  if (std::strcmp(library, function.library) == 0) return JFPX_ENGINE;
-  if (std::strcmp(library, function.library_f64) == 0) return JFPX_ENGINE_F64;
+  const bool is_double = std::strcmp(library, function.library_f64) == 0;
+  if (is_double || std::strcmp(library, function.library) == 0) {
+    if (has_precision_of_name(info.dli_fname, is_double)) {
+      return is_double ? JFPX_ENGINE_F64 : JFPX_ENGINE;
+    }
+    std::snprintf(g_reason, sizeof g_reason,
+                  "left to Bullet: %s is Bullet in %s, and jfpx was built with Bullet in %s under "
+                  "this name",
+                  info.dli_fname, is_double ? "float" : "double", is_double ? "double" : "float");
+    return nullptr;
+  }
   std::snprintf(g_reason, sizeof g_reason, "left to Bullet: %s is neither %s nor %s",
                 info.dli_fname, function.library, function.library_f64);
   return nullptr;
@@ -156,7 +223,14 @@ const char* common_engine(const Function& function, const void* caller) {
   for (const Function* other : {&g_dispatch, &g_solve, &g_update_boxes}) {
     bool is_private = false;
     const void* address = definition(other->symbol, caller, &is_private);
-    if (address != nullptr && engine_for(*other, address) != engine) return nullptr;
+    if (address == nullptr) continue;
+    const char* const others = engine_for(*other, address);
+    if (others == engine) continue;
+    if (engine != nullptr && others != nullptr) {
+      std::snprintf(g_reason, sizeof g_reason,
+                    "left to Bullet: the program has libraries of Bullet in float and in double");
+    }
+    return nullptr;
   }
   return engine;
 }
@@ -188,8 +262,13 @@ void find_function() {
   function.base = info.dli_fbase;
   pthread_mutex_lock(&g_mutex);
   replace_in_vtables(t_caller);  // Bullet may have been loaded after the program's start
-  const char* engine = is_enabled(function.part) ? common_engine(function, t_caller) : nullptr;
-  if (engine != nullptr) load_engine(&function, engine);
+  if (is_enabled(function.part)) {
+    const char* engine = common_engine(function, t_caller);
+    if (engine != nullptr) load_engine(&function, engine);
+  } else if (g_reason[0] == '\0') {
+    std::snprintf(g_reason, sizeof g_reason,
+                  "left to Bullet: JFPX_PRELOAD_PARTS contains no part that the program uses");
+  }
   pthread_mutex_unlock(&g_mutex);
 }
 
@@ -219,15 +298,23 @@ Choice<Attempt, Original> choose(Function* function, const void* caller) {
 
 /// Prints the summary at exit if JFPX_PRELOAD_SUMMARY is set.
 __attribute__((destructor)) void summarise() {
-  const char* setting = std::getenv("JFPX_PRELOAD_SUMMARY");
-  if (setting == nullptr || *setting == '\0' || std::strcmp(setting, "0") == 0) return;
+  if (!wants_summary()) return;
   char prefix[256];
   std::snprintf(prefix, sizeof prefix, "jfpx preload: %s: ", program_invocation_short_name);
+  const bool is_closed = fileno(stderr) < 0 || fcntl(fileno(stderr), F_GETFD) < 0;
+  FILE* const to = is_closed ? g_stderr : stderr;
+  if (to == nullptr) return;
+  char file[256];
   if (g_print_summary != nullptr) {
-    g_print_summary(prefix);
+    g_print_summary(to, prefix);
+  } else if (g_reason[0] != '\0') {
+    std::fprintf(to, "%s%s\n", prefix, g_reason);
+  } else if (StaticBullet::find(file, sizeof file)) {
+    std::fprintf(to, "%sleft to Bullet, which is statically linked in %s\n", prefix, file);
   } else {
-    std::fprintf(stderr, "%s%s\n", prefix, g_reason);
+    std::fprintf(to, "%sno shared library of Bullet was used\n", prefix);
   }
+  std::fflush(to);
 }
 
 }  // namespace

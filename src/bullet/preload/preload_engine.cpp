@@ -90,14 +90,14 @@ JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, cons
                                 static_cast<btDispatcher*>(argument));
 }
 
-JFPX_API void jfpx_preload_print_summary(const char* prefix) {
+JFPX_API void jfpx_preload_print_summary(std::FILE* to, const char* prefix) {
   using Count = unsigned long long;
   std::string_view backend = "none";
   const DispatchStats stats = sum_of_stats(&backend);
-  std::fprintf(stderr, "%sBullet in %s: %llu dispatches, %llu batches (%.*s)\n", prefix,
+  std::fprintf(to, "%sBullet in %s: %llu dispatches, %llu batches (%.*s)\n", prefix,
                sizeof(Real) == 4 ? "float" : "double", Count{stats.dispatches},
                Count{stats.batches}, static_cast<int>(backend.size()), backend.data());
-  std::fprintf(stderr,
+  std::fprintf(to,
                "%sbatches: %llu pairs, %llu sphere pairs, %llu touching, %llu written, "
                "%.1f ms prepare, %.1f ms commit\n",
                prefix, Count{stats.pairs}, Count{stats.sphere_pairs}, Count{stats.touching},
@@ -105,30 +105,30 @@ JFPX_API void jfpx_preload_print_summary(const char* prefix) {
   for (std::size_t i = 0; i < kFallbackCount; ++i) {
     if (stats.fallbacks[i] == 0) continue;
     const std::string_view reason = to_string(static_cast<Fallback>(i));
-    std::fprintf(stderr, "%sleft to Bullet: %llu (%.*s)\n", prefix, Count{stats.fallbacks[i]},
+    std::fprintf(to, "%sleft to Bullet: %llu (%.*s)\n", prefix, Count{stats.fallbacks[i]},
                  static_cast<int>(reason.size()), reason.data());
   }
   for (std::size_t i = 1; i < kOrderReasonCount; ++i) {
     if (stats.ordered[i] == 0) continue;
     const std::string_view reason = to_string(static_cast<OrderReason>(i));
-    std::fprintf(stderr, "%sbatches in Bullet's order: %llu (%.*s)\n", prefix,
-                 Count{stats.ordered[i]}, static_cast<int>(reason.size()), reason.data());
+    std::fprintf(to, "%sbatches in Bullet's order: %llu (%.*s)\n", prefix, Count{stats.ordered[i]},
+                 static_cast<int>(reason.size()), reason.data());
   }
   for (std::size_t i = 1; i < kConcaveFallbackCount; ++i) {
     if (stats.concave_fallbacks[i] == 0) continue;
     const std::string_view reason = to_string(static_cast<ConcaveFallback>(i));
-    std::fprintf(stderr, "%spairs with concave shapes left to Bullet: %llu (%.*s)\n", prefix,
+    std::fprintf(to, "%spairs with concave shapes left to Bullet: %llu (%.*s)\n", prefix,
                  Count{stats.concave_fallbacks[i]}, static_cast<int>(reason.size()), reason.data());
   }
   if (stats.verified > 0) {
-    std::fprintf(stderr, "%sverified: %llu pairs, %llu mismatches%s%s\n", prefix,
-                 Count{stats.verified}, Count{stats.mismatches},
+    std::fprintf(to, "%sverified: %llu pairs, %llu mismatches%s%s\n", prefix, Count{stats.verified},
+                 Count{stats.mismatches},
                  stats.first_mismatch.empty() ? "" : "; first: ", stats.first_mismatch.c_str());
   }
   for (const std::string& failure : {stats.failure, stats.device_failure}) {
-    if (!failure.empty()) std::fprintf(stderr, "%sfailed: %s\n", prefix, failure.c_str());
+    if (!failure.empty()) std::fprintf(to, "%sfailed: %s\n", prefix, failure.c_str());
   }
-  print_solver_summary(prefix);
+  print_solver_summary(to, prefix);
 }
 
 }  // extern "C"

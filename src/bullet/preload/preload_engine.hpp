@@ -1,6 +1,8 @@
 /// Interface between libjfpx-bullet-preload and the engine of one precision that it loads.
 #pragma once
 
+#include <cstdio>
+
 namespace jfpx::preload {
 
 /// Runs the dispatch as a batch; returns false if Bullet must run it. The pointers are those of
@@ -21,8 +23,8 @@ inline constexpr char kTrySolve[] = "jfpx_preload_try_solve";
 using TryUpdateBoxes = bool (*)(void* world);
 inline constexpr char kTryUpdateBoxes[] = "jfpx_preload_try_update_boxes";
 
-/// Writes a summary of all work so far to stderr; every line starts with `prefix`.
-using PrintSummary = void (*)(const char* prefix);
+/// Writes a summary of all work so far; every line starts with `prefix`.
+using PrintSummary = void (*)(std::FILE* to, const char* prefix);
 inline constexpr char kPrintSummary[] = "jfpx_preload_print_summary";
 
 }  // namespace jfpx::preload

@@ -138,27 +138,27 @@ class SolverStateTransfer {
 
 }  // namespace
 
-void print_solver_summary(const char* prefix) {
+void print_solver_summary(std::FILE* to, const char* prefix) {
   using Count = unsigned long long;
   const ConstraintSolverStats stats = sum_of_stats();
   if (g_aabb_updates > 0) {
-    std::fprintf(stderr, "%sworld: %llu AABB updates\n", prefix, Count{g_aabb_updates});
+    std::fprintf(to, "%sworld: %llu AABB updates\n", prefix, Count{g_aabb_updates});
   }
   if (stats.groups > 0) {
-    std::fprintf(stderr, "%ssolver: %llu groups, %llu contacts, %llu joints\n", prefix,
+    std::fprintf(to, "%ssolver: %llu groups, %llu contacts, %llu joints\n", prefix,
                  Count{stats.groups}, Count{stats.contacts}, Count{stats.joints});
   }
   if (stats.on_device > 0) {
-    std::fprintf(stderr, "%ssolver: %llu groups on a GPU\n", prefix, Count{stats.on_device});
+    std::fprintf(to, "%ssolver: %llu groups on a GPU\n", prefix, Count{stats.on_device});
   }
   for (const std::string& failure : {pool().failure(), stats.device_failure}) {
-    if (!failure.empty()) std::fprintf(stderr, "%ssolver: failed: %s\n", prefix, failure.c_str());
+    if (!failure.empty()) std::fprintf(to, "%ssolver: failed: %s\n", prefix, failure.c_str());
   }
   for (std::size_t i = 0; i < kSolverFallbacks; ++i) {
     if (stats.fallbacks[i] == 0) continue;
     const std::string_view reason = to_string(static_cast<SolverFallback>(i));
-    std::fprintf(stderr, "%sgroups left to Bullet: %llu (%.*s)\n", prefix,
-                 Count{stats.fallbacks[i]}, static_cast<int>(reason.size()), reason.data());
+    std::fprintf(to, "%sgroups left to Bullet: %llu (%.*s)\n", prefix, Count{stats.fallbacks[i]},
+                 static_cast<int>(reason.size()), reason.data());
   }
 }
 
