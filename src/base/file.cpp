@@ -29,9 +29,10 @@ std::string read_file(const std::string& path) {
   const File file(std::fopen(path.c_str(), "rb"));
   if (!file) throw FileError(file_message(path, "can't be opened", errno));
   std::string content;
-  char buffer[1 << 16];
-  for (std::size_t n; (n = std::fread(buffer, 1, sizeof buffer, file.get())) > 0;) {
-    content.append(buffer, n);
+  constexpr std::size_t kSize = std::size_t{1} << 16;  // too large for the stacks of some programs
+  const auto buffer = std::make_unique<char[]>(kSize);
+  for (std::size_t n; (n = std::fread(buffer.get(), 1, kSize, file.get())) > 0;) {
+    content.append(buffer.get(), n);
   }
   if (std::ferror(file.get()) != 0) throw FileError(file_message(path, "can't be read", errno));
   return content;

@@ -22,12 +22,10 @@ class SpatialOrder {
   template <class BoundsOf>
   SpatialOrder(std::size_t count, std::size_t sample, const BoundsOf& bounds_of) {
     const std::size_t size = std::min(count, sample);
-    std::array<Aabb, kMaxSample> boxes;
-    for (std::size_t i = 0; i < size; ++i) boxes[i] = bounds_of(count * i / size);
     std::array<Real, kMaxSample> values{};
     const auto sort_values = [&](const auto& quantity) {
       for (std::size_t i = 0; i < size; ++i) {
-        const Real value = quantity(boxes[i]);
+        const Real value = quantity(bounds_of(count * i / size));
         values[i] = value == value ? value : Real(0);  // the sum of opposite infinities is NaN
       }
       std::sort(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(size));

@@ -1,16 +1,17 @@
 /// A Bullet program without jfpx in an environment that few programs have:
 ///
-///     allocators             two worlds, each with an allocator of its own
-///     traps SPHERES          floating-point traps are enabled
-///     flags SPHERES          prints whether a step sets flags of floating-point exceptions
-///     rounding SPHERES       one world for each rounding mode
-///     stack BYTES SPHERES    a thread with a stack of this size
-///     name                   prints the name of a type, as a statically linked Bullet contains it
-///     threads WORLDS         worlds that step at the same time; prints the number of threads
+///     allocators          two worlds, each with an allocator of its own
+///     traps SPHERES       floating-point traps are enabled
+///     flags SPHERES       prints the flags of floating-point exceptions
+///     rounding SPHERES    one world for each rounding mode
+///     stack SPHERES       prints the stack that a step takes, in bytes
+///     name                prints a name that a statically linked Bullet contains
+///     threads WORLDS      worlds that step at the same time; prints the number of threads
 ///
 /// Prints hashes of the final positions.
 #include "tests/bullet/stock_world.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cfenv>
 #include <cstdint>
@@ -19,8 +20,10 @@
 #include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <memory>
 #include <pthread.h>
 #include <string>
+#include <sys/mman.h>
 #include <thread>
 #include <vector>
 
@@ -69,21 +72,32 @@ struct Allocator {
   }
 };
 
-void run_on_stack(std::size_t bytes, int spheres) {
-  static int s_spheres = 0;
-  static std::uint64_t s_hash = 0;
-  s_spheres = spheres;
+/// Runs a world on a thread with this stack.
+void run_on_stack(void* stack, std::size_t bytes, int spheres) {
+  const auto world = std::make_unique<stock_world::World>(spheres);
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, bytes);
+  pthread_attr_setstack(&attributes, stack, bytes);
   pthread_t thread;
-  const auto run = [](void*) -> void* {
-    s_hash = stock_world::drop(s_spheres);
+  const auto run = [](void* its_world) -> void* {
+    static_cast<stock_world::World*>(its_world)->run();
     return nullptr;
   };
-  if (pthread_create(&thread, &attributes, run, nullptr) != 0) std::abort();
+  if (pthread_create(&thread, &attributes, run, world.get()) != 0) std::abort();
   pthread_join(thread, nullptr);
-  print(s_hash);
+  print(world->hash());
+}
+
+void measure_stack(int spheres) {
+  constexpr std::size_t kBytes = std::size_t{1} << 20;
+  constexpr unsigned char kUnused = 0xa5;
+  void* const stack =
+      mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  std::memset(stack, kUnused, kBytes);
+  run_on_stack(stack, kBytes, spheres);
+  const auto* const bytes = static_cast<const unsigned char*>(stack);
+  const auto used = [](unsigned char byte) { return byte != kUnused; };
+  std::printf("%td\n", bytes + kBytes - std::find_if(bytes, bytes + kBytes, used));
 }
 
 const char kTypeName[] = "21btCollisionDispatcher";
@@ -116,7 +130,7 @@ void run_at_the_same_time(int worlds) {
 
 int main(int argc, char** argv) {
   const std::string mode = argc > 1 ? argv[1] : "";
-  const int first = argc > 2 ? std::atoi(argv[2]) : 0, second = argc > 3 ? std::atoi(argv[3]) : 0;
+  const int first = argc > 2 ? std::atoi(argv[2]) : 0;
   if (mode == "allocators") {
     Allocator<1>::run(100);
     Allocator<2>::run(300);
@@ -134,7 +148,7 @@ int main(int argc, char** argv) {
       print(stock_world::drop(first));
     }
   } else if (mode == "stack") {
-    run_on_stack(static_cast<std::size_t>(first), second);
+    measure_stack(first);
   } else if (mode == "name") {
     std::puts(kTypeName);
   } else if (mode == "threads") {

@@ -1,6 +1,7 @@
 /// Unmodified programs with and without the preloaded library.
 #include <jfpx/backend.hpp>
 
+#include "src/base/sanitizers.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -8,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <string>
 
 namespace jfpx {
 namespace {
@@ -305,6 +307,23 @@ TEST_F(Preload, StartsProgramsWithAddressSanitizer) {
 #else
   GTEST_SKIP() << "no program with AddressSanitizer";
 #endif
+}
+
+TEST_F(Preload, TakesLittleMoreStackThanBullet) {
+  if (kAddressSanitizer || kThreadSanitizer) GTEST_SKIP() << "sanitizers enlarge stack frames";
+  const std::string program = JFPX_ENVIRONMENT_PROGRAM " stack 300";
+  const ProcessResult stock = run_process(program);
+  const std::size_t hash_size = stock.output.find('\n') + 1;
+  const auto bytes_of = [&](const ProcessResult& result) {
+    EXPECT_EQ(result.status, 0);
+    EXPECT_EQ(result.output.substr(0, hash_size), stock.output.substr(0, hash_size));
+    return std::stoi(result.output.substr(hash_size));
+  };
+  for (const std::string threads : {"1", "2"}) {
+    const ProcessResult ours =
+        jfpx_command("preload --minimum-batch 0 --threads " + threads + " -- " + program);
+    EXPECT_LE(bytes_of(ours), bytes_of(stock) + 4096) << threads << " threads";
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 /// Bodies of many shapes fall onto terrains: stock and ours stay bit-identical with all three
 /// classes and any number of threads.
 #include "tests/bullet/all_parts.hpp"
+#include "tests/bullet/stack_use.hpp"
 
 #include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
@@ -234,6 +235,32 @@ TEST(MovingMeshes, OfGImpactFallAmongBodiesAsInStockBullet) {
     EXPECT_GT(twins.stats().batches, 0u);
   }
 }
+
+#if defined(NDEBUG)
+TEST(SmallStacks, AreUsedLittleMoreThanByStockBullet) {
+  if (kAddressSanitizer || kThreadSanitizer) GTEST_SKIP() << "sanitizers enlarge stack frames";
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Hills hills(seed);
+  const auto most = [](BulletWorld& w) {
+    std::size_t use = 0;
+    for (int step = 0; step < 60; ++step) {
+      use = std::max(use, stack_use([&] { w.world.stepSimulation(btScalar(1) / 60, 0); }));
+    }
+    return use;
+  };
+  for (const unsigned threads : {1u, 3u}) {
+    for (const Terrain terrain : {Terrain::triangles, Terrain::heights}) {
+      Twins twins(all_parts(threads, {.minimum_batch = 0}, {.minimum_batch = 0}));
+      twins.both([&](BulletWorld& w) { add_landscape(w, terrain, hills, seed, 300); });
+      ASSERT_TRUE(twins.step());
+      const std::size_t stock = most(twins.stock());
+      EXPECT_LT(most(twins.ours()), stock + 4096) << threads << " threads; stock: " << stock;
+      EXPECT_TRUE(twins.compare());
+    }
+  }
+}
+#endif
 
 /// Restores the floating-point environment at the end of a test.
 class EnvironmentKept {

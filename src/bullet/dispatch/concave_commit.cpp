@@ -190,7 +190,8 @@ class ConcavePair {
     }
   }
 
-  ConcaveFallback update_sphere(CommitCounts* counts) {
+  // The updates are not inlined: a program with small stacks needs that of one of them only.
+  [[gnu::noinline]] ConcaveFallback update_sphere(CommitCounts* counts) {
     if (!is_exactly<btSphereShape>(*convex_.getCollisionShape()))
       return ConcaveFallback::convex_class;
     if (!dispatch_.triangle_algorithms.has_stock_sphere()) return ConcaveFallback::create_function;
@@ -260,7 +261,8 @@ class ConcavePair {
     return function.m_numPerturbationIterations == 0 && is_exactly<btBoxShape>(shape());
   }
 
-  void update_box(const btConvexConvexAlgorithm::CreateFunc& function, const LocalBox& near) {
+  [[gnu::noinline]] void update_box(const btConvexConvexAlgorithm::CreateFunc& function,
+                                    const LocalBox& near) {
     const auto& box = static_cast<const btBoxShape&>(shape());
     const btScalar margin = box.btBoxShape::getMargin();
     const btVector3 half = box.getImplicitShapeDimensions() + btVector3(margin, margin, margin);
@@ -277,7 +279,8 @@ class ConcavePair {
           if (!detector.add_contact(triangle, &result_)) run(function, triangle, part, index);
         });
   }
-  void update_convex(const btConvexConvexAlgorithm::CreateFunc& function, const LocalBox& near) {
+  [[gnu::noinline]] void update_convex(const btConvexConvexAlgorithm::CreateFunc& function,
+                                       const LocalBox& near) {
     for_each_close_triangle(
         near,
         [&](const btVector3& direction) { return shape().localGetSupportingVertex(direction); },

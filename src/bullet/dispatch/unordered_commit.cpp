@@ -9,7 +9,6 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <utility>
 
@@ -36,17 +35,22 @@ void prefetch_convex(const SphereBatch& batch, std::size_t i) {
 class Committer {
  public:
   /// @param touching contacts of all pairs, not only of this range
+  /// @param scratch,remaining memory for as many pairs as are in the range
   Committer(btCollisionDispatcher& dispatcher, const SphereBatch& batch,
-            std::span<const PairContact> touching, std::size_t begin, std::size_t end)
+            std::span<const PairContact> touching, std::size_t begin, std::size_t end,
+            std::uint32_t* scratch, std::uint32_t* remaining)
       : dispatcher_(dispatcher),
         batch_(batch),
         next_(first_contact(touching, begin)),
         last_(touching.data() + touching.size()),
         begin_(begin),
-        end_(end) {}
+        end_(end),
+        found_(scratch),
+        remaining_(remaining) {}
 
   /// Writes the pairs that Bullet must process to `remaining` and returns their number.
-  std::size_t run(std::uint32_t* remaining) {
+  std::size_t run() {
+    // At most as many pairs remain as have been visited, so both lists share their memory.
     const std::span<const std::uint32_t> visits = find_visits();
     counts_.sphere_pairs += end_ - begin_ - visits.size();
     std::size_t count = 0;
@@ -57,7 +61,7 @@ class Committer {
       const std::uint32_t i = visits[k];
       while (next_ != last_ && next_->pair < i) ++next_;  // pairs that are not active
       const bool touches = next_ != last_ && next_->pair == i;
-      if (!commit(i, touches ? next_++ : nullptr)) remaining[count++] = i;
+      if (!commit(i, touches ? next_++ : nullptr)) remaining_[count++] = i;
     }
     return count;
   }
@@ -84,11 +88,11 @@ class Committer {
                             (!is_active(i) || batch_.manifold(i)->getNumContacts() == 0);
       count += is_empty ? 0 : 1;
     }
-    return with_touching({found_.data(), count});
+    return with_touching({found_, count});
   }
   /// The union of two ascending lists: `found`, and the active touching pairs of this range.
   std::span<const std::uint32_t> with_touching(std::span<const std::uint32_t> found) {
-    auto out = visits_.begin();
+    std::uint32_t* out = remaining_;
     const PairContact* touching = next_;
     const PairContact* const end = first_contact({next_, last_}, end_);
     const auto add_touching = [&] {
@@ -105,7 +109,7 @@ class Committer {
       *out++ = i;
     }
     while (touching != end) add_touching();
-    return {visits_.begin(), out};
+    return {remaining_, out};
   }
   /// Bullet does not process a pair of two inactive bodies.
   bool is_active(std::size_t i) const { return (batch_.either_trait(i) & kActive) != 0; }
@@ -155,7 +159,7 @@ class Committer {
   const SphereBatch& batch_;
   const PairContact *next_, *last_;
   std::size_t begin_, end_;
-  std::array<std::uint32_t, kPairChunk> found_, visits_;
+  std::uint32_t *found_, *remaining_;
   CommitCounts counts_;
 };
 
@@ -175,6 +179,7 @@ OrderReason reason_for_order(const SphereBatch& batch, bool may_override_filter)
 
 void UnorderedCommit::reserve(std::size_t pairs) {
   remaining_.resize(pairs);
+  found_.resize(pairs);
   chunks_.resize((pairs + kConvexChunk - 1) / kConvexChunk);
 }
 
@@ -193,8 +198,8 @@ CommitCounts UnorderedCommit::commit_spheres(const ConvexDispatch& dispatch,
   pool.run(chunks, [&](std::size_t chunk) {
     const std::size_t begin = chunk * kPairChunk;
     Committer committer(dispatch.dispatcher, dispatch.batch, touching, begin,
-                        std::min(n, begin + kPairChunk));
-    chunks_[chunk].remaining = committer.run(&remaining_[begin]);
+                        std::min(n, begin + kPairChunk), &found_[begin], &remaining_[begin]);
+    chunks_[chunk].remaining = committer.run();
     chunks_[chunk].counts = committer.counts();
   });
   return collect(chunks, kPairChunk);

@@ -45,6 +45,7 @@ class UnorderedCommit {
   CommitCounts collect(std::size_t chunks, std::size_t chunk_size);
 
   std::vector<std::uint32_t> remaining_;
+  std::vector<std::uint32_t> found_;  ///< by chunk: pairs to visit
   std::size_t remaining_count_ = 0;
   std::vector<Chunk> chunks_;
 };

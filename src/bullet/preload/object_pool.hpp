@@ -2,9 +2,11 @@
 #pragma once
 
 #include "src/bullet/failure.hpp"
+#include "src/bullet/preload/own_stack.hpp"
 
 #include <memory>
 #include <mutex>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -60,15 +62,27 @@ class ObjectPool {
       return object;
     }
     if (!failure_.empty()) return nullptr;
+    std::unique_ptr<Object> object;
+    preload::OwnStack::call([&] { object = make_object(); });
+    return object;
+  }
+  std::unique_ptr<Object> make_object() noexcept {
     try {
       idle_.reserve(created_ + 1);
       std::unique_ptr<Object> object = make_();
+      bind_aligned_new();
       ++created_;
       return object;
     } catch (const std::exception& error) {
       if (!is_out_of_memory(error)) failure_ = message_of(error);
       return nullptr;
     }
+  }
+  /// The run-time linker binds the functions that operator new calls at the first call, which takes
+  /// some kilobytes of stack.
+  static void bind_aligned_new() {
+    constexpr std::align_val_t kAlignment{64};
+    ::operator delete(::operator new(64, kAlignment), kAlignment);
   }
   void give_back(std::unique_ptr<Object> object) noexcept {
     const std::lock_guard lock(mutex_);

@@ -6,6 +6,7 @@
 /// changes the vtables instead. This file depends on neither Bullet nor the C++ library, because it
 /// is loaded into programs without them. The first call of one of the functions by Bullet loads the
 /// engine of the matching precision.
+#include "src/bullet/preload/own_stack.hpp"
 #include "src/bullet/preload/preload_engine.hpp"
 #include "src/bullet/preload/static_bullet.hpp"
 #include "src/bullet/preload/vtable.hpp"
@@ -283,7 +284,7 @@ template <class Attempt, class Original>
 Choice<Attempt, Original> choose(Function* function, const void* caller) {
   t_function = function;
   t_caller = caller;
-  pthread_once(&function->found, find_function);
+  pthread_once(&function->found, [] { OwnStack::call([] { find_function(); }); });
   if (function->is_private) {
     void* callers = private_definition(function->symbol, caller);
     Dl_info library;

@@ -67,14 +67,17 @@ class SphereColliderCpu final : public SphereCollider {
       PairContact* const begin = touching_.data() + (gaps ? chunk * kPairChunk : total);
       PairContact* out = begin;
       const std::span<const SpherePair> part = chunk_of(spheres, pairs, chunk);
-      std::array<std::uint32_t, kPairChunk> candidates;
-      const std::size_t count =
-          find_candidates(spheres.data(), part.data(), part.size(), candidates.data());
-      for (std::size_t k = 0; k < count; ++k) {
-        const SpherePair pair = part[candidates[k]];
-        const bool touch = detail::find_sphere_contact(spheres[pair.a], spheres[pair.b], out);
-        out->pair = static_cast<std::uint32_t>(chunk * kPairChunk + candidates[k]);
-        out += touch ? 1 : 0;
+      for (std::size_t first = 0; first < part.size(); first += kPairBlock) {
+        const auto block = part.subspan(first, std::min(part.size() - first, kPairBlock));
+        std::array<std::uint32_t, kPairBlock> candidates;
+        const std::size_t count =
+            find_candidates(spheres.data(), block.data(), block.size(), candidates.data());
+        for (std::size_t k = 0; k < count; ++k) {
+          const SpherePair pair = block[candidates[k]];
+          const bool touch = detail::find_sphere_contact(spheres[pair.a], spheres[pair.b], out);
+          out->pair = static_cast<std::uint32_t>(chunk * kPairChunk + first + candidates[k]);
+          out += touch ? 1 : 0;
+        }
       }
       touching_counts_[chunk] = static_cast<std::size_t>(out - begin);
       if (!gaps) total += touching_counts_[chunk];
@@ -93,6 +96,8 @@ class SphereColliderCpu final : public SphereCollider {
 
  private:
   static constexpr std::size_t kPairChunk = 2048;
+  /// Programs with small stacks call find_touching() through Bullet.
+  static constexpr std::size_t kPairBlock = 256;
   static std::size_t chunks_of(std::span<const SpherePair> pairs) {
     return (pairs.size() + kPairChunk - 1) / kPairChunk;
   }
