@@ -46,9 +46,13 @@ constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
 /// Threads that run the loops of one or several pools, one loop at a time.
 class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
  public:
-  /// The workers of an existing pool of the calling thread with as many threads, or new workers.
+  /// The workers of an existing pool of the calling thread with as many threads, or new workers,
+  /// or, where the process has enough threads, those of a pool of another thread.
   /// @throws std::bad_alloc
   static std::shared_ptr<Workers> shared(unsigned threads);
+  /// As many workers as `threads` requests, already acquired. Null if all are running loops, and
+  /// the process has enough threads, or there is no memory for more.
+  static std::shared_ptr<Workers> acquire_others(unsigned threads) noexcept;
 
   /// @param threads including the calling thread of run()
   explicit Workers(unsigned threads);
@@ -79,6 +83,9 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
     /// Number of the job in the upper half, number of remaining chunks in the lower half.
     std::atomic<std::uint64_t> value{0};
   };
+
+  static bool may_start(unsigned threads);
+  static std::shared_ptr<Workers> start(unsigned threads);
 
   void run_job(const Job& job);
   void work(unsigned self);
@@ -119,12 +126,56 @@ constinit std::mutex ThreadPool::Workers::list_mutex_;
 constinit ThreadPool::Workers* ThreadPool::Workers::list_ = nullptr;
 
 std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::shared(unsigned threads) {
+  // Released after the lock, which the destructor of the workers takes.
+  std::shared_ptr<Workers> of_others;
   const std::lock_guard lock(list_mutex_);
   for (Workers* known = list_; known != nullptr; known = known->next_) {
-    if (known->creator_ != std::this_thread::get_id() || known->requested_ != threads) continue;
+    if (known->requested_ != threads) continue;
+    const bool is_own = known->creator_ == std::this_thread::get_id();
+    if (!is_own && (of_others != nullptr || may_start(threads))) continue;
     // Null if another thread is destroying the last pool.
-    if (auto workers = known->weak_from_this().lock()) return workers;
+    auto workers = known->weak_from_this().lock();
+    if (is_own && workers != nullptr) return workers;
+    if (!is_own) of_others = std::move(workers);
   }
+  return of_others != nullptr ? of_others : start(threads);
+}
+
+std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::acquire_others(
+    unsigned threads) noexcept {
+  std::shared_ptr<Workers> found;  // released after the lock
+  // In a child process, the lock may be that of a thread that does not exist there.
+  const std::unique_lock lock(list_mutex_, std::try_to_lock);
+  if (!lock.owns_lock()) return nullptr;
+  for (Workers* known = list_; known != nullptr; known = known->next_) {
+    if (known->requested_ != threads || known->busy_.load(std::memory_order_relaxed)) continue;
+    found = known->weak_from_this().lock();
+    if (found == nullptr) continue;
+    return found->acquire() ? found : nullptr;
+  }
+  if (!may_start(threads)) return nullptr;
+  try {
+    found = start(threads);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+  found->acquire();
+  return found;
+}
+
+/// Whether the process has too few threads for a request: as many as the largest request, or one
+/// per core. More threads would only take the cores from each other.
+bool ThreadPool::Workers::may_start(unsigned threads) {
+  unsigned most = std::max(threads, std::thread::hardware_concurrency());
+  unsigned started = 1;
+  for (const Workers* known = list_; known != nullptr; known = known->next_) {
+    most = std::max(most, known->requested_);
+    started += known->thread_count_ - 1;
+  }
+  return started + threads - 1 <= most;
+}
+
+std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::start(unsigned threads) {
   auto workers = std::make_shared<Workers>(threads);
   workers->next_ = std::exchange(list_, workers.get());
   return workers;
@@ -298,13 +349,12 @@ unsigned ThreadPool::threads() const noexcept {
 
 void ThreadPool::run_shared(const Loop& loop) {
   if (!workers_->acquire()) {
-    try {
-      workers_ = std::make_shared<Workers>(workers_->requested());
-    } catch (const std::bad_alloc&) {
+    std::shared_ptr<Workers> others = Workers::acquire_others(workers_->requested());
+    if (others == nullptr) {
       for (std::size_t i = 0; i < loop.chunks; ++i) loop.call(loop.body, i);
       return;
     }
-    workers_->acquire();
+    workers_ = std::move(others);
   }
   const std::exception_ptr error = workers_->run(loop);
   workers_->release();

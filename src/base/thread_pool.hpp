@@ -19,7 +19,10 @@ inline namespace JFPX_ABI {
 ///
 /// Pools of equal size that one thread creates share their workers, so that consecutive parts of a
 /// step keep the same threads awake. If another pool is using the shared workers when a loop
-/// begins, the pool gets its own workers. Workers end with the last of their pools.
+/// begins, the pool gets other ones. Pools of equal size start no more threads than the largest
+/// pool has or, if that is more, than there are cores: beyond, pools of several threads share their
+/// workers, and a loop that finds all of them in use runs on the calling thread alone. Workers end
+/// with the last of their pools.
 class JFPX_API ThreadPool {
  public:
   static constexpr unsigned kMaxThreads = 256;

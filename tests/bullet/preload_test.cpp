@@ -8,8 +8,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <string>
+#include <thread>
 
 namespace jfpx {
 namespace {
@@ -307,6 +309,19 @@ TEST_F(Preload, StartsProgramsWithAddressSanitizer) {
 #else
   GTEST_SKIP() << "no program with AddressSanitizer";
 #endif
+}
+
+TEST_F(Preload, StartsNoMoreThreadsForSeveralWorlds) {
+  const std::string program = JFPX_ENVIRONMENT_PROGRAM " threads 8";
+  const auto threads_of = [](const ProcessResult& result) {
+    EXPECT_EQ(result.status, 0);
+    return std::stol(result.output);
+  };
+  const long ours =
+      threads_of(jfpx_command("preload --minimum-batch 0 --threads 64 -- " + program));
+  const long workers = std::max(64l, static_cast<long>(std::thread::hardware_concurrency())) - 1;
+  EXPECT_GT(ours, threads_of(run_process(program)));
+  EXPECT_LE(ours, 9 + workers) << "the threads of the program, and those of the largest pool";
 }
 
 TEST_F(Preload, TakesLittleMoreStackThanBullet) {
