@@ -61,6 +61,18 @@ Scene on_a_platform(std::uint32_t count, const Shape& shape) {
   return scene;
 }
 
+/// Bodies that touch the ground only, and may sleep.
+Scene apart_on_the_ground(std::uint32_t count, const Shape& shape) {
+  Scene scene = on_the_ground("apart");
+  scene.sleep.enabled = true;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Vec3 place{Real(2.5) * static_cast<Real>(i % 50), Real(0.5),
+                     Real(2.5) * static_cast<Real>(i / 50)};
+    scene.bodies.push_back(body_at(shape, place, 1));
+  }
+  return scene;
+}
+
 void compare_steps(benchmark::State& state, const Scene& scene, SimdLevel simd) {
   SceneWorldOptions options;
   options.solve.simd = simd;
@@ -119,6 +131,15 @@ void add(const std::string& name, const Scene& scene, SimdLevel simd = SimdLevel
       ->Unit(benchmark::kMillisecond);
 }
 
+/// A scene that sleeps, and the same beside a ball that may not sleep.
+void add_asleep(const std::string& name, std::uint32_t count, Scene scene) {
+  add(name + "/" + std::to_string(count), scene);
+  BodyDef awake = body_at(Sphere{Real(0.5)}, {1000, 0, 0}, 1);
+  awake.can_sleep = false;
+  scene.bodies.push_back(awake);
+  add(name + "_but_one/" + std::to_string(count), scene);
+}
+
 void register_all() {
   const Box box{{Real(0.5), Real(0.5), Real(0.5)}};
   for (const std::uint32_t n : {8u, 10u, 12u, 16u, 24u, 48u}) {
@@ -135,12 +156,11 @@ void register_all() {
     add("pile/" + std::to_string(n), pile);
   }
   for (const std::uint32_t n : {64u, 512u, 4096u}) {
-    Scene pile = scenes::make("pile", {.spheres = n});
-    add("asleep/" + std::to_string(n), pile);
-    BodyDef awake = body_at(Sphere{Real(0.5)}, {1000, 0, 0}, 1);
-    awake.can_sleep = false;
-    pile.bodies.push_back(awake);
-    add("asleep_but_one/" + std::to_string(n), pile);
+    add_asleep("asleep", n, scenes::make("pile", {.spheres = n}));
+  }
+  for (const std::uint32_t n : {300u, 1000u, 3000u}) {
+    add_asleep("balls_asleep_apart", n, apart_on_the_ground(n, Sphere{Real(0.5)}));
+    add_asleep("boxes_asleep_apart", n, apart_on_the_ground(n, box));
   }
 }
 

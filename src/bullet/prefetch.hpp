@@ -80,6 +80,9 @@ inline void prefetch_first_point(const btPersistentManifold* manifold) {
 
 /// Prefetch distances in elements: manifolds usually miss the caches, bodies rarely do.
 inline constexpr int kManifoldsAhead = 16, kObjectsAhead = 8;
+/// Minimum number of objects of a world whose loops prefetch: fewer stay in the cache, and the
+/// prefetches take longer than the reads.
+inline constexpr int kPrefetchedObjects = 8192;
 
 /// Prefetches the flags, island tag, companion id and activation state of an object. The members
 /// are private, so the offset is a guess; a wrong guess is harmless.

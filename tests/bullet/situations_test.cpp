@@ -1,5 +1,5 @@
 /// Bullet worlds with special bodies and settings: stock and ours stay bit-identical.
-#include "tests/bullet/twin_worlds.hpp"
+#include "tests/bullet/all_parts.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btSimpleBroadphase.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
@@ -57,6 +57,68 @@ TEST(Situations, SleepersKeepTheirPointsAndWake) {
   EXPECT_GT(asleep, 10) << "the scene must put bodies to sleep";
   twins.both([](BulletWorld& w) { w.add_sphere(1, btVector3(1, 6, 1), 5); });
   ASSERT_TRUE(twins.step(120));
+}
+
+/// Bodies of several shapes that sleep apart on a floor, and some balls that roll among them.
+void add_sleepers(BulletWorld& w, std::uint64_t seed, int rolling) {
+  Random random(seed);
+  w.add(w.keep(new btBoxShape(btVector3(50, 1, 50))), btVector3(0, -1, 0), 0);
+  btCollisionShape* const shapes[] = {w.keep(new btSphereShape(btScalar(0.5))),
+                                      w.keep(new btBoxShape(btVector3(1, 1, 1) / 2)),
+                                      w.keep(new btCapsuleShape(btScalar(0.5), 1))};
+  constexpr int kEdge = 18;
+  for (int i = 0; i < kEdge * kEdge; ++i) {
+    btRigidBody* body =
+        w.add(shapes[i % 3], btVector3(btScalar(i % kEdge) * 2, i % 3 == 2 ? 1 : btScalar(0.5),
+                                       btScalar(i / kEdge) * 2));
+    body->setActivationState(ISLAND_SLEEPING);
+  }
+  for (int i = 0; i < rolling; ++i) {
+    const Vec3 p = random.uniform_in_box({0, 1, 0}, {36, 3, 36});
+    w.add_sphere(btScalar(0.4), btVector3(p.x, p.y, p.z))
+        ->setLinearVelocity(btVector3(p.z / 4, 0, -p.x / 4));
+  }
+}
+
+TEST(Situations, AFewBodiesRollAmongSleepers) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const bool deterministic : {false, true}) {
+    for (const int rolling : {0, 1, 12}) {
+      for (const unsigned threads : {1u, 3u}) {
+        Twins twins(all_parts(threads, {.minimum_batch = 100}));
+        twins.both([&](BulletWorld& w) {
+          w.world.getDispatchInfo().m_deterministicOverlappingPairs = deterministic;
+          add_sleepers(w, seed, rolling);
+        });
+        ASSERT_TRUE(twins.step(100)) << deterministic << rolling << threads;
+        EXPECT_EQ(twins.stats().batches, 100u);
+      }
+    }
+  }
+}
+
+/// Wakes a body that has not been visited in this dispatch.
+bool wake_another(btManifoldPoint&, const btCollisionObjectWrapper* a, int, int,
+                  const btCollisionObjectWrapper*, int, int) {
+  const int awake = a->getCollisionObject()->getUserIndex();
+  g_current->bodies[static_cast<std::size_t>(awake * 7 % 320) + 1]->activate(true);
+  return true;
+}
+
+TEST(Situations, ACallbackWakesSleepersDuringADispatch) {
+  gContactAddedCallback = wake_another;
+  Twins twins(all_parts(1, {.minimum_batch = 100}));
+  twins.both([&](BulletWorld& w) {
+    add_sleepers(w, 5, 3);
+    for (auto& body : w.bodies) {
+      body->setCollisionFlags(body->getCollisionFlags() |
+                              btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+    }
+  });
+  const bool same = twins.step(60);
+  gContactAddedCallback = nullptr;
+  ASSERT_TRUE(same);
 }
 
 TEST(Situations, KinematicPushersSensorsAndIgnoreLists) {

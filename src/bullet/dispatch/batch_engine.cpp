@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/floating_point.hpp"
+#include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/pair_check.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/failure.hpp"
@@ -14,6 +15,7 @@
 #include <BulletCollision/CollisionDispatch/btSphereSphereCollisionAlgorithm.h>
 #include <LinearMath/btQuickprof.h>
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <functional>
@@ -62,6 +64,19 @@ bool has_stock_sphere_function(const btCollisionDispatcher& dispatcher) {
   return function != nullptr && is_exactly<btSphereSphereCollisionAlgorithm::CreateFunc>(*function);
 }
 
+const btCollisionObject& object_of(const btBroadphaseProxy* proxy) {
+  return *static_cast<const btCollisionObject*>(proxy->m_clientObject);
+}
+
+/// Whether user code that runs for a pair may activate bodies of later pairs.
+bool may_activate(const btCollisionObject& a, const btCollisionObject& b) {
+  return a.*BodyFields::check_collide_with != 0 || b.*BodyFields::check_collide_with != 0;
+}
+bool has_callbacks() {
+  return contacts_are_observed() || gContactProcessedCallback != nullptr ||
+         gContactAddedCallback != nullptr;
+}
+
 /// Whether pairs with concave shapes are so many that a batch without spheres gains with one
 /// thread.
 bool has_many_concave_pairs(const SphereBatch& batch) {
@@ -108,6 +123,12 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
                           btOverlappingPairCache& cache, Fallback* fallback) {
   const TrapsMasked masked;
   try {
+    few_are_active_ = !traits.may_override_filter &&
+                      is_exactly<btHashedOverlappingPairCache>(cache) && find_few_active();
+    if (few_are_active_) {
+      order_reason_ = OrderReason::none;
+      return true;
+    }
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
     // Most pairs of other shapes gain only from several threads.
@@ -121,8 +142,6 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
       order_reason_ = OrderReason::pair_cache;
     }
     touching_ = {};
-    is_asleep_ = order_reason_ == OrderReason::none && (batch_.any_trait() & kActive) == 0;
-    if (is_asleep_) return true;
     if (spheres >= 2) find_touching();
     if (order_reason_ == OrderReason::none) {
       unordered_commit_.reserve(pairs_.size());
@@ -157,6 +176,22 @@ void BatchEngine::find_touching() {
   }
 }
 
+/// Lists the pairs with an active body. Bullet does not process the others, which no callback can
+/// observe. Returns false at the first pair that is too many for visits one after the other.
+bool BatchEngine::find_few_active() {
+  active_.clear();
+  active_.reserve(std::min(minimum_batch_, pairs_.size()));
+  const bool any_callback = has_callbacks();
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    const btCollisionObject &a = object_of(pairs_[i].m_pProxy0),
+                            &b = object_of(pairs_[i].m_pProxy1);
+    if (!a.isActive() && !b.isActive()) continue;
+    if (active_.size() >= minimum_batch_ || any_callback || may_activate(a, b)) return false;
+    active_.push_back(static_cast<std::uint32_t>(i));
+  }
+  return true;
+}
+
 bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                            btOverlappingPairCache& cache, const btDispatcherInfo& info,
                            btDispatcher* argument) {
@@ -178,7 +213,7 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTr
   stats_.last_order = order_reason_;
   stats_.pairs += pairs.size();
   const auto prepared = Clock::now();
-  if (!is_asleep_) commit(dispatcher, cache, info, argument);
+  commit(dispatcher, cache, info, argument);
   stats_.prepare_ms += milliseconds(start, prepared);
   stats_.commit_ms += milliseconds(prepared, Clock::now());
   return true;
@@ -188,6 +223,11 @@ void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCac
                          const btDispatcherInfo& info, btDispatcher* argument) {
   const Running running(&running_);
   BT_PROFILE("processAllOverlappingPairs");
+  if (few_are_active_) {
+    UnorderedCommit::sort(active_, pairs_, info.m_deterministicOverlappingPairs);
+    visit(dispatcher, cache, info, active_, [](std::size_t) {});
+    return;
+  }
   if (order_reason_ == OrderReason::none) {
     commit_unordered(dispatcher, cache, info);
     return;
@@ -217,8 +257,15 @@ void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlapp
     add(unordered_commit_.run(dispatch, touching_, pool_));
   }
   if (verify_) check_convex(dispatcher, info);
-  unordered_commit_.sort_remaining(pairs_, info.m_deterministicOverlappingPairs);
-  visit_remaining(dispatcher, cache, info);
+  const std::span<std::uint32_t> remaining = unordered_commit_.remaining();
+  UnorderedCommit::sort(remaining, pairs_, info.m_deterministicOverlappingPairs);
+  visit(dispatcher, cache, info, remaining, [&](std::size_t i) {
+    prefetch_for_contact(*batch_.body_a(i));
+    prefetch_for_contact(*batch_.body_b(i));
+    if (batch_.manifold(i) == nullptr) return;
+    prefetch_header(batch_.manifold(i));
+    prefetch_first_point(batch_.manifold(i));
+  });
   if (!verify_) return;
   for (std::size_t i = 0; i < n; ++i) {
     if (batch_.kind(i) != PairKind::spheres || !batch_.both_are_spheres(i)) continue;
@@ -226,29 +273,23 @@ void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlapp
   }
 }
 
-void BatchEngine::visit_remaining(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                                  const btDispatcherInfo& info) {
+/// Passes the chosen pairs, and those that are added meanwhile, to Bullet's near callback.
+template <class Prefetch>
+void BatchEngine::visit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                        const btDispatcherInfo& info, std::span<const std::uint32_t> chosen,
+                        const Prefetch& prefetch_pair) {
   constexpr std::size_t kAhead = 4;
-  const std::span<const std::uint32_t> remaining = unordered_commit_.remaining();
   const std::size_t n = pairs_.size();
   // Bullet's algorithms may reallocate the array.
-  const auto visit = [&](std::size_t i) {
+  const auto visit_pair = [&](std::size_t i) {
     if (i >= pairs_of(cache).size()) return;
     (*dispatcher.getNearCallback())(cache.getOverlappingPairArrayPtr()[i], dispatcher, info);
   };
-  for (std::size_t k = 0; k < remaining.size(); ++k) {
-    if (k + kAhead < remaining.size()) {
-      const std::size_t i = remaining[k + kAhead];
-      prefetch_for_contact(*batch_.body_a(i));
-      prefetch_for_contact(*batch_.body_b(i));
-      if (batch_.manifold(i) != nullptr) {
-        prefetch_header(batch_.manifold(i));
-        prefetch_first_point(batch_.manifold(i));
-      }
-    }
-    visit(remaining[k]);
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    if (k + kAhead < chosen.size()) prefetch_pair(chosen[k + kAhead]);
+    visit_pair(chosen[k]);
   }
-  for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit(i);
+  for (std::size_t i = n; i < pairs_of(cache).size(); ++i) visit_pair(i);
 }
 
 void BatchEngine::add(const CommitCounts& counts) {

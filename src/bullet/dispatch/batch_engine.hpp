@@ -7,8 +7,10 @@
 #include "src/bullet/dispatch/ordered_commit.hpp"
 #include "src/bullet/dispatch/unordered_commit.hpp"
 
+#include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -55,13 +57,16 @@ class JFPX_API BatchEngine {
                                const btDispatcherInfo& info) const;
   bool prepare(btCollisionDispatcher& dispatcher, const DispatcherTraits& traits,
                btOverlappingPairCache& cache, Fallback* fallback);
+  bool find_few_active();
   void find_touching();
   void commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
               const btDispatcherInfo& info, btDispatcher* argument);
   void commit_unordered(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                         const btDispatcherInfo& info);
-  void visit_remaining(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                       const btDispatcherInfo& info);
+  template <class Prefetch>
+  void visit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+             const btDispatcherInfo& info, std::span<const std::uint32_t> chosen,
+             const Prefetch& prefetch_pair);
   void add(const CommitCounts& counts);
   void check(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info, std::size_t i,
              bool current);
@@ -83,7 +88,8 @@ class JFPX_API BatchEngine {
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
   OrderReason order_reason_ = OrderReason::none;
-  bool is_asleep_ = false;  ///< no body is active, so that nothing changes
+  bool few_are_active_ = false;        ///< Bullet processes the pairs in active_, and no others
+  std::vector<std::uint32_t> active_;  ///< numbers of pairs
 };
 
 }  // namespace bullet

@@ -238,12 +238,13 @@ CommitCounts UnorderedCommit::collect(std::size_t chunks, std::size_t chunk_size
   return sum;
 }
 
-void UnorderedCommit::sort_remaining(std::span<const btBroadphasePair> pairs, bool deterministic) {
+void UnorderedCommit::sort(std::span<std::uint32_t> numbers,
+                           std::span<const btBroadphasePair> pairs, bool deterministic) {
   if (!deterministic) return;  // already ascending, which is the order of the array
   const auto ids = [&](std::uint32_t i) {
     return std::pair(pairs[i].m_pProxy0->m_uniqueId, pairs[i].m_pProxy1->m_uniqueId);
   };
-  std::sort(remaining_.begin(), remaining_.begin() + static_cast<std::ptrdiff_t>(remaining_count_),
+  std::sort(numbers.begin(), numbers.end(),
             [&](std::uint32_t p, std::uint32_t q) { return ids(p) > ids(q); });
 }
 

@@ -27,11 +27,12 @@ class UnorderedCommit {
   /// Updates the pairs that do not require Bullet, and lists all others in remaining().
   CommitCounts run(const ConvexDispatch& dispatch, std::span<const PairContact> touching,
                    ThreadPool& pool);
-  /// Sorts the remaining pairs into the order in which btHashedOverlappingPairCache visits them,
-  /// with or without m_deterministicOverlappingPairs.
-  void sort_remaining(std::span<const btBroadphasePair> pairs, bool deterministic);
-  /// The pairs that Bullet must process.
-  std::span<const std::uint32_t> remaining() const { return {remaining_.data(), remaining_count_}; }
+  /// The pairs that Bullet must process, in ascending order.
+  std::span<std::uint32_t> remaining() { return {remaining_.data(), remaining_count_}; }
+  /// Sorts ascending numbers of pairs into the order in which btHashedOverlappingPairCache visits
+  /// them, with or without m_deterministicOverlappingPairs.
+  static void sort(std::span<std::uint32_t> numbers, std::span<const btBroadphasePair> pairs,
+                   bool deterministic);
 
  private:
   struct Chunk {

@@ -64,6 +64,9 @@ void prefetch_body(btCollisionObjectArray& objects, int i) {
   }
 }
 
+/// Time of a search in Bullet's tree, in units of the time to sort a leaf.
+constexpr std::size_t kTimeOfSearch = 16;
+
 /// Prefetches the data that apply_update() changes.
 void prefetch_leaf(std::span<const LeafUpdate> leaves, std::size_t i) {
   constexpr std::size_t kAhead = 4;
@@ -94,7 +97,8 @@ bool AabbUpdate::run(btCollisionWorld& world, ThreadPool& pool) {
   if (!reserve_geometric(static_cast<std::size_t>(leaves))) return false;
 
   // Leaves without an object of the world are not among the updates.
-  if (leaves >= minimum_objects_ && leaves == world.getNumCollisionObjects()) {
+  const bool is_calm = calm_ && pool.threads() == 1 && world.getDebugDrawer() == nullptr;
+  if (!is_calm && leaves >= minimum_objects_ && leaves == world.getNumCollisionObjects()) {
     BT_PROFILE("updateAabbs");  // Bullet's name of the profile zone
     if (compute_updates(world, tree, pool)) {
       if (few_leaves_move(pool)) {
@@ -132,11 +136,11 @@ bool AabbUpdate::compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree
 
 /// Whether searching Bullet's tree for each moving leaf takes less time than a search for all
 /// leaves, which sorts them.
-bool AabbUpdate::few_leaves_move(const ThreadPool& pool) const {
-  constexpr std::size_t kTimeOfSearch = 16;  // in units of the time to sort a leaf
+bool AabbUpdate::few_leaves_move(const ThreadPool& pool) {
   const auto moving = std::count_if(leaves_.begin(), leaves_.end(),
                                     [](const LeafUpdate& leaf) { return leaf.moves; });
-  return static_cast<std::size_t>(moving) * kTimeOfSearch * pool.threads() < leaves_.size();
+  calm_ = static_cast<std::size_t>(moving) * kTimeOfSearch * pool.threads() < leaves_.size();
+  return calm_;
 }
 
 /// Moves the leaves, and searches Bullet's tree for the overlaps of each moving leaf.
@@ -244,13 +248,16 @@ void AabbUpdate::run_one_by_one(btCollisionWorld& world, btDbvtBroadphase& tree,
                                 btHashedOverlappingPairCache& cache) {
   DeferredSearch search(tree);
   btCollisionObjectArray& objects = world.getCollisionObjectArray();
+  std::size_t moving = 0;
   for (int i = 0; i < objects.size(); ++i) {
-    prefetch_body(objects, i);
+    if (objects.size() >= kPrefetchedObjects) prefetch_body(objects, i);
     btCollisionObject* object = objects[i];
     if (!world.getForceUpdateAllAabbs() && !object->isActive()) continue;
     if (!search.needed_after([&] { world.updateSingleAabb(object); })) continue;
+    ++moving;
     search_tree(tree, cache, *static_cast<const btDbvtProxy*>(object->getBroadphaseHandle()));
   }
+  calm_ = moving * kTimeOfSearch < static_cast<std::size_t>(objects.size());
 }
 
 /// Adds the new pairs of a leaf that has moved.

@@ -47,7 +47,7 @@ class JFPX_API AabbUpdate {
 
   bool reserve_geometric(std::size_t leaves) noexcept;
   bool compute_updates(btCollisionWorld& world, btDbvtBroadphase& tree, ThreadPool& pool);
-  bool few_leaves_move(const ThreadPool& pool) const;
+  bool few_leaves_move(const ThreadPool& pool);
   void run_in_tree(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache);
   bool run_in_parallel(btDbvtBroadphase& tree, btHashedOverlappingPairCache& cache,
                        ThreadPool& pool);
@@ -62,6 +62,7 @@ class JFPX_API AabbUpdate {
   void add_pairs(btHashedOverlappingPairCache& cache);
 
   int minimum_objects_;
+  bool calm_ = false;  ///< few leaves moved in the last update; one by one is then faster
   std::vector<LeafUpdate> leaves_;
   OverlapSearch search_;
   std::vector<NewPair> new_pairs_;  ///< in Bullet's order, up to `ordered_`

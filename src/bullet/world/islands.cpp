@@ -42,7 +42,16 @@ void point_to_roots(btUnionFind* unions) {
 }
 
 void prefetch_island_state_of(const btCollisionObjectArray& objects, int i) {
-  if (i < objects.size()) prefetch_island_state(objects[i]);
+  const int count = objects.size();
+  if (count >= kPrefetchedObjects && i < count) prefetch_island_state(objects[i]);
+}
+/// @param number of the next movable object
+void number_object(btCollisionObjectArray& objects, int i, int* number) {
+  prefetch_island_state_of(objects, i + kObjectsAhead);
+  btCollisionObject& object = *objects[i];
+  if (!object.isStaticOrKinematicObject()) object.setIslandTag((*number)++);
+  object.setCompanionId(-1);
+  object.setHitFraction(1);
 }
 const btCollisionObject* object_of(const btBroadphaseProxy* proxy) {
   return static_cast<const btCollisionObject*>(proxy->m_clientObject);
@@ -82,12 +91,13 @@ bool needs_solving(btDispatcher& dispatcher, const btPersistentManifold& manifol
 template <class Unite>
 void for_each_union(std::span<const btBroadphasePair> pairs, const Unite& unite) {
   const std::size_t count = pairs.size();
+  const bool prefetches = count >= kPrefetchedObjects;
   for (std::size_t i = 0; i < count; ++i) {
-    if (i + 2 * kObjectsAhead < count) {
+    if (prefetches && i + 2 * kObjectsAhead < count) {
       prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy0);
       prefetch(pairs[i + 2 * kObjectsAhead].m_pProxy1);
     }
-    if (i + kObjectsAhead < count) {
+    if (prefetches && i + kObjectsAhead < count) {
       prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy0));
       prefetch_island_state(object_of(pairs[i + kObjectsAhead].m_pProxy1));
     }
@@ -167,6 +177,17 @@ void IslandSolver::in_object_chunks(const btCollisionObjectArray& objects, const
 
 /// Numbers the movable objects; numbers_ receives the first number of each chunk, and the total.
 void IslandSolver::number_objects(btCollisionObjectArray& objects) {
+  if (pool_.threads() == 1) {
+    int number = 0;
+    for (int i = 0; i < objects.size(); ++i) {
+      if (static_cast<std::size_t>(i) % kObjectsPerChunk == 0) {
+        numbers_[static_cast<std::size_t>(i) / kObjectsPerChunk] = number;
+      }
+      number_object(objects, i, &number);
+    }
+    numbers_.back() = number;
+    return;
+  }
   in_object_chunks(objects, [&](std::size_t chunk, int first, int last) {
     int movable = 0;
     for (int i = first; i < last; ++i) {
@@ -180,13 +201,7 @@ void IslandSolver::number_objects(btCollisionObjectArray& objects) {
   for (int& number : numbers_) next += std::exchange(number, next);
   in_object_chunks(objects, [&](std::size_t chunk, int first, int last) {
     int number = numbers_[chunk];
-    for (int i = first; i < last; ++i) {
-      prefetch_island_state_of(objects, i + kObjectsAhead);
-      btCollisionObject& object = *objects[i];
-      if (!object.isStaticOrKinematicObject()) object.setIslandTag(number++);
-      object.setCompanionId(-1);
-      object.setHitFraction(1);
-    }
+    for (int i = first; i < last; ++i) number_object(objects, i, &number);
   });
 }
 
@@ -281,7 +296,9 @@ bool IslandSolver::update_sleep(btCollisionObjectArray& objects, btUnionFind& un
     const int island = unions.getElement(first).m_id;
     bool asleep = true;
     for (last = first; last < count && unions.getElement(last).m_id == island; ++last) {
-      if (last + kObjectsAhead < count) prefetch_island_state(object(last + kObjectsAhead));
+      if (count >= kPrefetchedObjects && last + kObjectsAhead < count) {
+        prefetch_island_state(object(last + kObjectsAhead));
+      }
       const btCollisionObject& o = *object(last);
       const int state = o.getActivationState();
       if (o.getIslandTag() == island && (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION)) {
