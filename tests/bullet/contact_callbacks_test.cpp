@@ -26,7 +26,14 @@ std::string numbers_of(const btManifoldPoint& point) {
 bool on_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a, int index_a,
               const btCollisionObjectWrapper* b, int part_b, int index_b) {
   log_event("added " + name_of(a->getCollisionObject()) + " " + name_of(b->getCollisionObject()) +
-            " " + numbers_of(point) + " " + std::to_string(part_a + index_a + part_b + index_b));
+            " " + numbers_of(point));
+  for (const btCollisionObjectWrapper* wrapper : {a, b}) {
+    log_event(std::to_string(wrapper->getCollisionShape()->getShapeType()) + " " +
+              bits_of(wrapper->getWorldTransform().getOrigin()) + " " +
+              std::to_string(wrapper->m_partId) + " " + std::to_string(wrapper->m_index) +
+              (wrapper->m_parent == nullptr ? "" : " parent"));
+  }
+  for (const int number : {part_a, index_a, part_b, index_b}) log_event(std::to_string(number));
   point.m_combinedFriction = btScalar(0.125);
   point.m_userPersistentData = const_cast<btCollisionObject*>(a->getCollisionObject());
   return true;
@@ -135,7 +142,7 @@ TEST_F(ContactCallbacks, AreTheReasonForBulletsOrderInTheStatistics) {
       ASSERT_TRUE(same) << to_string(reason);
       EXPECT_EQ(twins.stats().ordered[index], 10u) << to_string(reason);
       EXPECT_EQ(twins.stats().last_order, reason);
-      const bool by_bullet = reason == contact_callback || reason == combine_callback;
+      const bool by_bullet = reason == combine_callback;
       EXPECT_EQ(twins.stats().written == 0, by_bullet) << to_string(reason);
     }
   }
@@ -212,6 +219,93 @@ TEST_F(ContactCallbacks, MayDispatchAnotherCache) {
   twins.both([](BulletWorld& w) { add_heap(w, 40, 26); });
   ASSERT_TRUE(twins.step(5));
   EXPECT_GT(twins.stats().fallbacks[static_cast<std::size_t>(Fallback::nested)], 0u);
+}
+
+/// Changes bodies in a way that later pairs of the same dispatch notice.
+void disturb(const btCollisionObject* object) {
+  if (g_current == nullptr || g_current->log.size() % 7 != 0) return;
+  auto* body = btRigidBody::upcast(const_cast<btCollisionObject*>(object));
+  if (body->isStaticObject()) return;
+  if (g_current->log.size() % 3 == 0) {
+    static_cast<btSphereShape*>(body->getCollisionShape())->setUnscaledRadius(btScalar(0.45));
+  } else {
+    body->getWorldTransform().getOrigin().setX(body->getWorldTransform().getOrigin().x() +
+                                               btScalar(0.01));
+  }
+  body->setFriction(btScalar(0.1) * btScalar(g_current->log.size() % 10));
+  body->activate(true);
+}
+void on_started_disturb(btPersistentManifold* const& manifold) {
+  on_started(manifold);
+  disturb(manifold->getBody0());
+}
+void on_ended_disturb(btPersistentManifold* const& manifold) {
+  on_ended(manifold);
+  disturb(manifold->getBody1());
+}
+bool on_destroyed_disturb(void* data) {
+  on_destroyed(data);
+  disturb(static_cast<btCollisionObject*>(data));
+  return true;
+}
+bool on_added_disturb(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a,
+                      int index_a, const btCollisionObjectWrapper* b, int part_b, int index_b) {
+  on_added(point, a, part_a, index_a, b, part_b, index_b);
+  disturb(b->getCollisionObject());
+  return true;
+}
+bool on_processed_disturb(btManifoldPoint& point, void* a, void* b) {
+  on_processed(point, a, b);
+  disturb(static_cast<btCollisionObject*>(b));
+  return true;
+}
+
+TEST_F(ContactCallbacks, MayChangeTheBodiesOfTheirContact) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (unsigned which = 1; which < 32; ++which) {
+    gContactStartedCallback = (which & 1) != 0 ? on_started_disturb : nullptr;
+    gContactEndedCallback = (which & 2) != 0 ? on_ended_disturb : nullptr;
+    gContactDestroyedCallback = (which & 4) != 0 ? on_destroyed_disturb : nullptr;
+    gContactProcessedCallback = (which & 8) != 0 ? on_processed_disturb : nullptr;
+    gContactAddedCallback = (which & 16) != 0 ? on_added_disturb : nullptr;
+    Twins twins;
+    twins.both([&](BulletWorld& w) {
+      add_heap(w, 60, seed);
+      flag_custom_material(w, 5);
+    });
+    ASSERT_TRUE(twins.step(20)) << which;
+    EXPECT_EQ(twins.stats().batches, 20u);
+    EXPECT_GT(twins.stats().written, 0u);
+  }
+}
+
+/// Removes a body that the started contact does not concern, and adds it again later.
+void on_started_remove(btPersistentManifold* const& manifold) {
+  on_started(manifold);
+  if (g_current == nullptr || g_current->log.size() % 50 != 0) return;
+  for (auto& body : g_current->bodies) {
+    if (body.get() == manifold->getBody0() || body.get() == manifold->getBody1()) continue;
+    if (body->isStaticObject() || body->getBroadphaseHandle() == nullptr) continue;
+    if ((g_current->log.size() + static_cast<std::size_t>(body->getUserIndex())) % 3 != 0) continue;
+    g_current->world.removeRigidBody(body.get());
+    return;
+  }
+}
+
+TEST_F(ContactCallbacks, MayRemoveBodies) {
+  gContactStartedCallback = on_started_remove;
+  Twins twins;
+  twins.both([](BulletWorld& w) { add_heap(w, 80, 28); });
+  for (int step = 0; step < 30; ++step) {
+    ASSERT_TRUE(twins.step());
+    twins.both([](BulletWorld& w) {
+      for (auto& body : w.bodies) {
+        if (body->getBroadphaseHandle() == nullptr) w.world.addRigidBody(body.get());
+      }
+    });
+  }
+  EXPECT_GT(twins.stats().written, 0u);
 }
 
 }  // namespace

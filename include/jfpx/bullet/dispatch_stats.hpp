@@ -34,7 +34,7 @@ JFPX_API std::string_view to_string(Fallback fallback) noexcept;
 enum class OrderReason : std::uint8_t {
   none,                ///< any order, on all threads
   combine_callback,    ///< the user combines materials; Bullet computes all contacts
-  contact_callback,    ///< contact started, ended or destroyed is set; Bullet computes all contacts
+  contact_callback,    ///< contact started, ended or destroyed is set
   processed_callback,  ///< contact processed is set
   added_callback,      ///< contact added is set, and a body has CF_CUSTOM_MATERIAL_CALLBACK
   filter,              ///< the class of the dispatcher or of a body may override a filter

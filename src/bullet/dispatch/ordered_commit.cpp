@@ -1,8 +1,11 @@
 /// Traversal of the pairs in Bullet's order.
 #include "src/bullet/dispatch/ordered_commit.hpp"
 
+#include "src/bullet/dispatch/body_wrapper.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/prefetch.hpp"
+
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
 
@@ -12,12 +15,14 @@ namespace bullet {
 
 class OrderedCommit::Walk final : public btOverlapCallback {
  public:
-  Walk(const OrderedCommit& commit, btCollisionDispatcher& dispatcher, const btDispatcherInfo& info,
-       const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
-       std::span<const PairContact> touching, const Visited& visited)
+  Walk(const OrderedCommit& commit, btCollisionDispatcher& dispatcher,
+       btOverlappingPairCache& cache, const btDispatcherInfo& info, const SphereBatch& batch,
+       std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
+       const Visited& visited)
       : actions_(commit.actions_),
         contacts_(commit.contacts_),
         dispatcher_(dispatcher),
+        cache_(cache),
         info_(info),
         batch_(batch),
         pairs_(pairs),
@@ -28,12 +33,15 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     const std::size_t i = (reinterpret_cast<std::uintptr_t>(&pair) -
                            reinterpret_cast<std::uintptr_t>(pairs_.data())) /
                           sizeof(btBroadphasePair);
-    if (i >= pairs_.size()) {  // added by a callback during this traversal
+    // A callback may have added, removed or moved the pair.
+    if (is_changed_ || i >= pairs_.size() || !batch_.is_entry_of(pair, i)) {
       visit_stock(pair);
       return false;
     }
     prefetch_commit(i + kAhead);
     const bool current = visit(i, pair);
+    if (actions_[i] == Action::stock || actions_[i] == Action::commit) note_changes(i, pair);
+    if (is_changed_) return false;
     if (visited_ && batch_.kind(i) == PairKind::spheres && batch_.both_are_spheres(i)) {
       visited_(i, current);
     }
@@ -55,8 +63,23 @@ class OrderedCommit::Walk final : public btOverlapCallback {
 
   static bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& a,
                        const btCollisionObject& b) {
+    constexpr int kSpecial = btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING |
+                             btCollisionObject::CF_HAS_FRICTION_ANCHOR;
     const int flags = a.getCollisionFlags() | b.getCollisionFlags();
-    return (flags & special_collision_flags()) == 0 && manifold.getBody0() == &a;
+    return (flags & kSpecial) == 0 && manifold.getBody0() == &a;
+  }
+  static bool calls_added(const btCollisionObject& a, const btCollisionObject& b) {
+    const int flags = a.getCollisionFlags() | b.getCollisionFlags();
+    return gContactAddedCallback != nullptr &&
+           (flags & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) != 0;
+  }
+
+  /// Notes whether a callback for the pair has changed its bodies or the pair cache, so that the
+  /// contacts of later pairs may differ. Removed bodies, which may not exist, are not read.
+  void note_changes(std::size_t i, const btBroadphasePair& pair) {
+    // Bullet may have created the algorithm of the pair.
+    is_changed_ = static_cast<std::size_t>(cache_.getNumOverlappingPairs()) != pairs_.size() ||
+                  !batch_.is_entry_of_proxies(pair, i) || !batch_.has_current_spheres(i);
   }
 
   void visit_stock(btBroadphasePair& pair) const {
@@ -86,29 +109,65 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     // Evaluated for every contact, because a callback may set another callback.
     const PairContact* contact = contacts_[i] != kNone ? &touching_[contacts_[i]] : nullptr;
     const bool is_not_finite = contact != nullptr && !has_finite_values(*contact);
-    if (contacts_are_observed() || is_not_finite || !is_plain(*manifold, *a, *b)) {
+    is_changed_ = !batch_.has_current_spheres(i);
+    if (is_changed_ || materials_are_combined_by_user() || is_not_finite ||
+        !is_plain(*manifold, *a, *b)) {
       visit_stock(pair);
       return false;  // the near callback calls the filter itself and does not return its result
     }
     if (!dispatcher_.needsCollision(a, b)) return false;
     ++written_;
-    manifold->setNumContacts(0);
-    // Reads the current materials, because callbacks may change those of their bodies.
-    if (contact != nullptr) {
-      write_contact(manifold, *contact, state_of(*a), state_of(*b), batch_.radius_b(i));
+    if (!contacts_are_observed() && !calls_added(*a, *b)) {
+      manifold->setNumContacts(0);
+      // Reads the current materials, because callbacks may change those of their bodies.
+      if (contact != nullptr) {
+        write_contact(manifold, *contact, state_of(*a), state_of(*b), batch_.radius_b(i));
+      }
+      return true;
     }
-    return true;
+    // Calls gContactDestroyedCallback and gContactEndedCallback. Like Bullet's algorithm, the rest
+    // has the distance from before these calls, and all else from after them.
+    const Real radius_b = batch_.radius_b(i);
+    manifold->clearManifold();
+    if (contact != nullptr) add_observed(manifold, *contact, *a, *b, radius_b);
+    return false;  // callbacks may have changed the point
+  }
+
+  /// Adds the point of a touching pair to an empty manifold, and calls gContactAddedCallback and
+  /// gContactStartedCallback.
+  static void add_observed(btPersistentManifold* manifold, const PairContact& contact,
+                           const btCollisionObject& a, const btCollisionObject& b, Real radius_b) {
+    if (materials_are_combined_by_user() || !is_plain(*manifold, a, b)) {
+      const btCollisionObjectWrapper wrapper_a = wrapper_of(a), wrapper_b = wrapper_of(b);
+      btManifoldResult result(&wrapper_a, &wrapper_b);
+      result.setPersistentManifold(manifold);
+      const btVector3 normal(contact.normal.x, contact.normal.y, contact.normal.z);
+      result.addContactPoint(normal, b.getWorldTransform().getOrigin() + radius_b * normal,
+                             contact.distance);
+      return;
+    }
+    write_contact(manifold, contact, state_of(a), state_of(b), radius_b);
+    if (manifold->getNumContacts() == 0) return;  // farther than the breaking threshold
+    if (calls_added(a, b)) {
+      const btCollisionObjectWrapper wrapper_a = wrapper_of(a), wrapper_b = wrapper_of(b);
+      btManifoldPoint& point = manifold->getContactPoint(0);
+      gContactAddedCallback(point, &wrapper_a, point.m_partId0, point.m_index0, &wrapper_b,
+                            point.m_partId1, point.m_index1);
+    }
+    if (gContactStartedCallback != nullptr) gContactStartedCallback(manifold);
   }
 
   std::span<const Action> actions_;
   std::span<const std::uint32_t> contacts_;
   btCollisionDispatcher& dispatcher_;
+  btOverlappingPairCache& cache_;
   const btDispatcherInfo& info_;
   const SphereBatch& batch_;
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
   const Visited& visited_;
   std::uint64_t written_ = 0;
+  bool is_changed_ = false;  ///< Bullet processes all remaining pairs
 };
 
 CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairContact> touching,
@@ -143,7 +202,7 @@ std::uint64_t OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappin
                                  const btDispatcherInfo& info, btDispatcher* argument,
                                  const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
                                  std::span<const PairContact> touching, const Visited& visited) {
-  Walk walk(*this, dispatcher, info, batch, pairs, touching, visited);
+  Walk walk(*this, dispatcher, cache, info, batch, pairs, touching, visited);
   cache.processAllOverlappingPairs(&walk, argument, info);
   return walk.written();
 }

@@ -13,12 +13,14 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 /// One traversal of all pairs by the pair cache itself, so that the order is Bullet's for every
-/// class of cache. A touching pair is written in place if no callback can observe it. All other
-/// pairs, including those of other shapes, are passed to Bullet's near callback.
+/// class of cache. A touching pair of spheres is written in place, and the callbacks are called as
+/// Bullet's algorithm calls them. All other pairs, including those of other shapes, and all pairs
+/// after a callback has changed bodies or pairs, are passed to Bullet's near callback.
 class OrderedCommit {
  public:
   /// Called after the visit of each sphere pair. `current` is true if the manifold matches the
-  /// contacts, and false if a filter may have prevented its update.
+  /// contacts, and false if a filter may have prevented its update, or a callback changed the
+  /// point.
   using Visited = std::function<void(std::size_t i, bool current)>;
 
   /// Determines the action for each pair from the current manifolds. `may_override_filter`: the

@@ -70,6 +70,14 @@ class PairTable {
   /// Null for PairKind::other.
   btPersistentManifold* manifold(std::size_t i) const { return links_[i].manifold(); }
   const ProxyTable& proxies() const { return proxies_; }
+  /// Whether entry i is that of the proxies of the pair. Dereferences no pointer.
+  bool is_entry_of_proxies(const btBroadphasePair& pair, std::size_t i) const {
+    return keys_[i].proxy0 == pair.m_pProxy0 && keys_[i].proxy1 == pair.m_pProxy1;
+  }
+  /// Whether entry i is that of the pair. Dereferences no pointer.
+  bool is_entry_of(const btBroadphasePair& pair, std::size_t i) const {
+    return is_entry_of_proxies(pair, i) && keys_[i].algorithm == pair.m_algorithm;
+  }
 
  private:
   /// The manifold and the kind of a pair, and whether they may be cached; otherwise they are reread

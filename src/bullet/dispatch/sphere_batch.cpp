@@ -15,6 +15,7 @@
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <typeinfo>
 
@@ -77,6 +78,21 @@ std::uint8_t SphereBatch::read_body(std::size_t number) {
     spheres_[number] = {{}, kNaN};
   }
   return static_cast<std::uint8_t>(traits);
+}
+
+bool SphereBatch::is_current(SphereIndex number) const {
+  if ((traits_[number] & kSphere) == 0) return true;
+  const btCollisionObject& body = *bodies_[number];
+  const btCollisionShape* const shape = body.getCollisionShape();
+  if (shape->getShapeType() != SPHERE_SHAPE_PROXYTYPE) return false;
+  const btVector3& centre = body.getWorldTransform().getOrigin();
+  const SphereInstance now{{centre.x(), centre.y(), centre.z()},
+                           static_cast<const btSphereShape*>(shape)->getRadius()};
+  const SphereInstance& then = spheres_[number];
+  // Bits: the signs of zeros differ in results.
+  const Real values[] = {now.centre.x, now.centre.y, now.centre.z, now.radius};
+  const Real kept[] = {then.centre.x, then.centre.y, then.centre.z, then.radius};
+  return std::memcmp(values, kept, sizeof values) == 0;
 }
 
 void SphereBatch::prefetch_states(std::size_t i) const {

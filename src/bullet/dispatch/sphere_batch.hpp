@@ -56,6 +56,19 @@ class SphereBatch {
   std::span<const SphereInstance> spheres() const { return spheres_; }
   std::span<const SpherePair> pairs() const { return table_.pairs(); }
 
+  /// Whether the pair was pair i when its bodies were read.
+  bool is_entry_of(const btBroadphasePair& pair, std::size_t i) const {
+    return table_.is_entry_of(pair, i);
+  }
+  bool is_entry_of_proxies(const btBroadphasePair& pair, std::size_t i) const {
+    return table_.is_entry_of_proxies(pair, i);
+  }
+  /// Whether those bodies of pair i that were spheres still are the same spheres. The bodies must
+  /// exist.
+  bool has_current_spheres(std::size_t i) const {
+    return is_current(pairs()[i].a) && is_current(pairs()[i].b);
+  }
+
   PairKind kind(std::size_t i) const { return table_.kind(i); }
   /// The manifold of pair i; null if the kind is PairKind::other.
   btPersistentManifold* manifold(std::size_t i) const { return table_.manifold(i); }
@@ -88,6 +101,7 @@ class SphereBatch {
     return copies_states_ ? states_[number] : state_of(*bodies_[number]);
   }
 
+  bool is_current(SphereIndex number) const;
   Summary read_bodies(std::size_t begin, std::size_t end);
   std::uint8_t read_body(std::size_t number);
 
