@@ -36,6 +36,15 @@ class TrapsMasked {
 #endif
 };
 
+/// Whether no floating-point exception raises a trap.
+inline bool traps_are_masked() noexcept {
+#if defined(__x86_64__)
+  return (_mm_getcsr() & _MM_MASK_MASK) == _MM_MASK_MASK;
+#else
+  return fegetexcept() == 0;
+#endif
+}
+
 /// Whether results are rounded to the nearest value, the default.
 inline bool rounds_to_nearest() noexcept {
 #if defined(__x86_64__)

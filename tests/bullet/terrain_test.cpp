@@ -7,6 +7,7 @@
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btScaledBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleInfoMap.h>
+#include <BulletCollision/CollisionShapes/btTriangleShape.h>
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
@@ -236,6 +237,126 @@ TEST(MovingMeshes, OfGImpactFallAmongBodiesAsInStockBullet) {
   }
 }
 
+/// Callbacks that note what they see, and sometimes change the bodies of the contact.
+void note(const char* event, const btManifoldPoint& point) {
+  log_event(std::string(event) + " " + bits_of(point.m_distance1) + " " +
+            bits_of(point.m_normalWorldOnB) + " " + bits_of(point.m_localPointA) + " " +
+            std::to_string(point.m_lifeTime));
+}
+void note(const char* event, const btPersistentManifold& manifold) {
+  log_event(std::string(event) + " " + name_of(manifold.getBody0()) + " " +
+            name_of(manifold.getBody1()) + " " + std::to_string(manifold.getNumContacts()));
+  for (int i = 0; i < manifold.getNumContacts(); ++i) note("point", manifold.getContactPoint(i));
+}
+void note(const btCollisionObjectWrapper& wrapper) {
+  const btCollisionShape& shape = *wrapper.getCollisionShape();
+  std::string text = name_of(wrapper.getCollisionObject()) + " " +
+                     std::to_string(shape.getShapeType()) + " " + bits_of(shape.getMargin()) + " " +
+                     bits_of(wrapper.getWorldTransform().getOrigin()) + " " +
+                     std::to_string(wrapper.m_partId) + " " + std::to_string(wrapper.m_index);
+  if (wrapper.m_parent != nullptr) {
+    text += " in " + std::to_string(wrapper.m_parent->getCollisionShape()->getShapeType());
+  }
+  if (shape.getShapeType() == TRIANGLE_SHAPE_PROXYTYPE) {
+    const auto& triangle = static_cast<const btTriangleShape&>(shape);
+    for (const btVector3& vertex : triangle.m_vertices1) text += " " + bits_of(vertex);
+  }
+  log_event(std::move(text));
+}
+bool g_disturbs = false;
+void disturb(const btCollisionObject* object) {
+  if (g_current == nullptr || !g_disturbs || g_current->log.size() % 17 != 0) return;
+  auto* body = btRigidBody::upcast(const_cast<btCollisionObject*>(object));
+  if (body == nullptr || body->isStaticObject()) return;
+  btVector3& origin = body->getWorldTransform().getOrigin();
+  origin.setY(origin.y() - btScalar(0.02));
+  if (body->getCollisionShape()->getShapeType() == SPHERE_SHAPE_PROXYTYPE) {
+    auto* sphere = static_cast<btSphereShape*>(body->getCollisionShape());
+    sphere->setUnscaledRadius(sphere->getRadius() * btScalar(1.01));
+  }
+}
+bool observe_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a,
+                   int index_a, const btCollisionObjectWrapper* b, int part_b, int index_b) {
+  note("added", point);
+  note(*a);
+  note(*b);
+  for (const int number : {part_a, index_a, part_b, index_b}) log_event(std::to_string(number));
+  point.m_combinedFriction = btScalar(0.25);
+  point.m_normalWorldOnB = (point.m_normalWorldOnB + btVector3(0, btScalar(0.1), 0)).normalized();
+  point.m_userPersistentData = const_cast<btCollisionObject*>(a->getCollisionObject());
+  disturb(a->getCollisionObject());
+  disturb(b->getCollisionObject());
+  return true;
+}
+bool observe_processed(btManifoldPoint& point, void* a, void* b) {
+  note("processed", point);
+  disturb(static_cast<btCollisionObject*>(a));
+  disturb(static_cast<btCollisionObject*>(b));
+  return true;
+}
+bool observe_destroyed(void* data) {
+  log_event("destroyed " + name_of(static_cast<btCollisionObject*>(data)));
+  return true;
+}
+void observe_started(btPersistentManifold* const& manifold) {
+  note("started", *manifold);
+  disturb(manifold->getBody0());
+}
+void observe_ended(btPersistentManifold* const& manifold) {
+  note("ended", *manifold);
+  disturb(manifold->getBody0());
+}
+
+class ObservedTerrains : public ::testing::Test {
+ protected:
+  ~ObservedTerrains() override { observe(0); }
+
+  static void observe(unsigned which) {
+    gContactAddedCallback = (which & 1) != 0 ? observe_added : nullptr;
+    gContactProcessedCallback = (which & 2) != 0 ? observe_processed : nullptr;
+    gContactDestroyedCallback = (which & 4) != 0 ? observe_destroyed : nullptr;
+    gContactStartedCallback = (which & 8) != 0 ? observe_started : nullptr;
+    gContactEndedCallback = (which & 16) != 0 ? observe_ended : nullptr;
+  }
+};
+
+TEST_F(ObservedTerrains, CallTheCallbacksOfStockBullet) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  Hills hills(seed);  // outlives the worlds
+  Random random(seed);
+  std::uint64_t concaves = 0, boxes = 0, planes = 0;
+  for (const Terrain terrain : {Terrain::triangles, Terrain::scaled_triangles, Terrain::heights}) {
+    for (int repeat = 0; repeat < 6; ++repeat) {
+      const unsigned which = 1 + static_cast<unsigned>(random.below(31));
+      g_disturbs = repeat % 2 == 1;
+      Twins twins(all_parts(1 + repeat % 3, {.minimum_batch = 0}, {.minimum_batch = 0}));
+      twins.both([&](BulletWorld& w) {
+        add_landscape(w, terrain, hills, seed + which, 60);
+        w.add(w.keep(new btStaticPlaneShape(btVector3(1, 0, 0), -5)), btVector3(0, 0, 0), 0);
+        w.add(w.keep(new btBoxShape(btVector3(1, 6, 10))), btVector3(5, 1, 0), 0);
+        // Touches more triangles than small spheres.
+        w.add_sphere(2, btVector3(0, 5, 0), 5);
+        for (std::size_t i = 0; i < w.bodies.size(); i += 2) {
+          w.bodies[i]->setCollisionFlags(w.bodies[i]->getCollisionFlags() |
+                                         btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+        }
+      });
+      observe(which);
+      const bool same = twins.step(60);
+      observe(0);
+      ASSERT_TRUE(same) << "callbacks " << which << " disturb " << g_disturbs;
+      concaves += twins.stats().sphere_concaves;
+      boxes += twins.stats().sphere_boxes;
+      planes += twins.stats().sphere_planes;
+      EXPECT_EQ(twins.stats().ordered[0], 0u);
+    }
+  }
+  EXPECT_GT(concaves, 0u);
+  EXPECT_GT(boxes, 0u);
+  EXPECT_GT(planes, 0u);
+}
+
 #if defined(NDEBUG)
 TEST(SmallStacks, AreUsedLittleMoreThanByStockBullet) {
   if (kAddressSanitizer || kThreadSanitizer) GTEST_SKIP() << "sanitizers enlarge stack frames";
@@ -251,12 +372,15 @@ TEST(SmallStacks, AreUsedLittleMoreThanByStockBullet) {
   };
   for (const unsigned threads : {1u, 3u}) {
     for (const Terrain terrain : {Terrain::triangles, Terrain::heights}) {
+      gContactProcessedCallback = [](btManifoldPoint&, void*, void*) { return true; };
+      if (threads == 3 || terrain == Terrain::heights) gContactProcessedCallback = nullptr;
       Twins twins(all_parts(threads, {.minimum_batch = 0}, {.minimum_batch = 0}));
       twins.both([&](BulletWorld& w) { add_landscape(w, terrain, hills, seed, 300); });
       ASSERT_TRUE(twins.step());
       const std::size_t stock = most(twins.stock());
       EXPECT_LT(most(twins.ours()), stock + 4096) << threads << " threads; stock: " << stock;
       EXPECT_TRUE(twins.compare());
+      gContactProcessedCallback = nullptr;
     }
   }
 }

@@ -235,23 +235,31 @@ void BatchEngine::commit(btCollisionDispatcher& dispatcher, btOverlappingPairCac
   const auto verify = [&](std::size_t i, bool current) { check(dispatcher, info, i, current); };
   OrderedCommit::Visited visited;
   if (verify_) visited = std::ref(verify);  // std::ref avoids an allocation
-  stats_.written +=
-      ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, touching_, visited);
+  const ConvexDispatch convex = convex_dispatch(dispatcher, info);
+  // Traps could be raised by operations that Bullet does not execute.
+  const bool uses_convex = !verify_ && traps_are_masked();
+  add(ordered_commit_.run(dispatcher, cache, info, argument, batch_, pairs_, touching_,
+                          uses_convex ? &convex : nullptr, visited));
+}
+
+ConvexDispatch BatchEngine::convex_dispatch(btCollisionDispatcher& dispatcher,
+                                            const btDispatcherInfo& info) {
+  triangle_algorithms_.read(dispatcher);
+  // set_verify() runs Bullet's algorithms itself, to compare the results with those of jfpx.
+  return {.dispatcher = dispatcher,
+          .info = info,
+          .batch = batch_,
+          .pairs = pairs_,
+          .runs_algorithms = !verify_,
+          .triangle_algorithms = triangle_algorithms_,
+          .ignores_separated = TriangleAlgorithms::ignores_separated()};
 }
 
 void BatchEngine::commit_unordered(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                                    const btDispatcherInfo& info) {
   const std::size_t n = pairs_.size();
   if (verify_) convex_check_.remember(batch_);
-  // set_verify() runs Bullet's algorithms itself, to compare the results with those of jfpx.
-  triangle_algorithms_.read(dispatcher);
-  const ConvexDispatch dispatch{.dispatcher = dispatcher,
-                                .info = info,
-                                .batch = batch_,
-                                .pairs = pairs_,
-                                .runs_algorithms = !verify_,
-                                .triangle_algorithms = triangle_algorithms_,
-                                .ignores_separated = TriangleAlgorithms::ignores_separated()};
+  const ConvexDispatch dispatch = convex_dispatch(dispatcher, info);
   {
     const TrapsMasked masked;
     add(unordered_commit_.run(dispatch, touching_, pool_));

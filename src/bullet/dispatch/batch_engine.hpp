@@ -61,6 +61,7 @@ class JFPX_API BatchEngine {
   void find_touching();
   void commit(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
               const btDispatcherInfo& info, btDispatcher* argument);
+  ConvexDispatch convex_dispatch(btCollisionDispatcher& dispatcher, const btDispatcherInfo& info);
   void commit_unordered(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                         const btDispatcherInfo& info);
   template <class Prefetch>

@@ -21,7 +21,12 @@
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleShape.h>
 
+#include <algorithm>
 #include <array>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -165,6 +170,38 @@ class ConcavePair {
     return ConcaveFallback::none;
   }
 
+  /// Updates the manifold of a sphere, and calls the callbacks as Bullet does.
+  ConcaveFallback update_sphere_in_order(CommitCounts* counts) {
+    if (!has_known_triangles(*concave_.getCollisionShape())) return ConcaveFallback::concave_class;
+    if (!is_exactly<btSphereShape>(*convex_.getCollisionShape())) {
+      return ConcaveFallback::convex_class;
+    }
+    if (!dispatch_.triangle_algorithms.has_stock_sphere()) return ConcaveFallback::create_function;
+    const SphereTriangleInput sphere = sphere_input();
+    const btVector3 center = concave_.getWorldTransform().inverse()(
+                        convex_.getWorldTransform().getOrigin()),
+                    extent(sphere.radius, sphere.radius, sphere.radius);
+    LocalBox box{center - extent, center + extent};
+    if (!widen(&box)) return ConcaveFallback::not_finite;
+    std::array<ObservedContact, 8> contacts;
+    std::size_t count = 0;
+    const bool finite =
+        for_each_contact(sphere, box, [&](const Contact& contact, const btVector3* triangle) {
+          if (count < contacts.size()) contacts[count].set(contact, triangle);
+          ++count;
+        });
+    if (!finite) return ConcaveFallback::not_finite;
+    begin();
+    if (count > contacts.size()) {
+      add_in_order(box, 0, triangle_margin());
+    } else if (count > 0) {
+      add_in_order(box, {contacts.data(), count});
+    }
+    result_.refreshContactPoints();
+    ++counts->sphere_concaves;
+    return ConcaveFallback::none;
+  }
+
  private:
   /// The shape, once it is known to be convex.
   const btConvexShape& shape() const {
@@ -180,6 +217,11 @@ class ConcavePair {
     box->max += extra;
     box->min -= extra;
     return is_bounded(box->max) && is_bounded(box->min);
+  }
+  SphereTriangleInput sphere_input() const {
+    const btTransform &from = concave_.getWorldTransform(), &pose = convex_.getWorldTransform();
+    return {(pose.getOrigin() - from.getOrigin()) * from.getBasis(),
+            static_cast<const btSphereShape&>(shape()).getRadius(), threshold()};
   }
   void begin() { manifold_.setBodies(convex_.getCollisionObject(), concave_.getCollisionObject()); }
   void set_triangle(int part, int index) {
@@ -206,16 +248,18 @@ class ConcavePair {
     // Contacts are added when all triangles have been read, because one may not be finite.
     std::array<Contact, 8> contacts;
     std::size_t count = 0;
-    const bool finite = for_each_contact(sphere, box, [&](const Contact& contact) {
-      if (count < contacts.size()) contacts[count] = contact;
-      ++count;
-    });
+    const bool finite =
+        for_each_contact(sphere, box, [&](const Contact& contact, const btVector3*) {
+          if (count < contacts.size()) contacts[count] = contact;
+          ++count;
+        });
     if (!finite) return ConcaveFallback::not_finite;
     begin();
     if (count <= contacts.size()) {
       for (std::size_t k = 0; k < count; ++k) add(contacts[k]);
     } else {
-      for_each_contact(sphere, box, [&](const Contact& contact) { add(contact); });
+      for_each_contact(sphere, box,
+                       [&](const Contact& contact, const btVector3*) { add(contact); });
     }
     result_.refreshContactPoints();
     ++counts->sphere_concaves;
@@ -225,7 +269,84 @@ class ConcavePair {
   struct Contact {
     SphereTriangleContact point;
     int part, index;
+    std::size_t turn;  ///< number of the triangle in the traversal
   };
+  /// A contact and its triangle, which the callback may read.
+  struct ObservedContact {
+    void set(const Contact& of, const btVector3* vertices) {
+      contact = of;
+      std::copy_n(vertices, 3, triangle);
+    }
+    Contact contact;
+    btVector3 triangle[3];
+  };
+  /// What the contacts of a sphere depend on. A callback may change it between two triangles.
+  struct SphereState {
+    explicit SphereState(const ConcavePair& pair)
+        : sphere(pair.sphere_input()),
+          triangle_pose(pair.concave_.getWorldTransform()),
+          sphere_pose(pair.convex_.getWorldTransform()),
+          test(triangle_pose, sphere_pose, sphere.threshold),
+          support(sphere.radius) {}
+    SphereState(const SphereState&) = delete;
+    SphereState& operator=(const SphereState&) = delete;
+
+    bool is_current(const ConcavePair& pair) const {
+      // Bits: the signs of zeros differ in results.
+      const auto is_equal = [](const btTransform& a, const btTransform& b) {
+        return std::memcmp(static_cast<const void*>(&a), static_cast<const void*>(&b), sizeof a) ==
+               0;
+      };
+      return is_equal(triangle_pose, pair.concave_.getWorldTransform()) &&
+             is_equal(sphere_pose, pair.convex_.getWorldTransform()) &&
+             sphere.radius == static_cast<const btSphereShape&>(pair.shape()).getRadius() &&
+             sphere.threshold == pair.threshold();
+    }
+
+    const SphereTriangleInput sphere;
+    const btTransform triangle_pose, sphere_pose;
+    const SeparationTest test;
+    const SphereSupport support;
+  };
+  /// Adds the contacts. If a callback changes what they depend on, computes the later ones again.
+  void add_in_order(const LocalBox& box, std::span<const ObservedContact> contacts) {
+    const SphereState state(*this);
+    const btScalar margin = triangle_margin();
+    for (const ObservedContact& observed : contacts) {
+      add_observed(observed.contact, observed.triangle, margin);
+      if (state.is_current(*this)) continue;
+      add_in_order(box, observed.contact.turn + 1, margin);
+      return;
+    }
+  }
+  /// Adds the contacts with the triangles from the given one on, each before the next triangle is
+  /// read.
+  void add_in_order(const LocalBox& box, std::size_t first, btScalar margin) {
+    std::optional<SphereState> state(std::in_place, *this);
+    std::size_t turn = 0;
+    for_each_triangle(
+        *concave_.getCollisionShape(), box, [&](const btVector3* triangle, int part, int index) {
+          if (turn++ < first) return;
+          if (!state->is_current(*this)) state.emplace(*this);
+          Contact contact{.point = {}, .part = part, .index = index, .turn = turn};
+          if (!find_contact(state->sphere, triangle, &contact.point)) return;
+          if (dispatch_.ignores_separated && state->test.is_separated(triangle, state->support)) {
+            return;
+          }
+          add_observed(contact, triangle, margin);
+        });
+  }
+  /// Adds a contact with a wrapper of its triangle, which the callback receives.
+  void add_observed(const Contact& contact, const btVector3* triangle, btScalar margin) {
+    btTriangleShape triangle_shape(triangle[0], triangle[1], triangle[2]);
+    triangle_shape.setMargin(margin);
+    const btCollisionObjectWrapper wrapper(
+        &concave_, &triangle_shape, concave_.getCollisionObject(), concave_.getWorldTransform(),
+        contact.part, contact.index);
+    concave_first_ ? result_.setBody0Wrap(&wrapper) : result_.setBody1Wrap(&wrapper);
+    add(contact);
+    concave_first_ ? result_.setBody0Wrap(&a_) : result_.setBody1Wrap(&b_);
+  }
   /// Calls visit() for the contacts of a sphere, in Bullet's order. Returns false if a triangle is
   /// not finite.
   template <class Visit>
@@ -235,17 +356,18 @@ class ConcavePair {
                               threshold());
     const SphereSupport support(sphere.radius);
     bool finite = true;
+    std::size_t turn = 0;
     for_each_triangle(*concave_.getCollisionShape(), box,
                       [&](const btVector3* triangle, int part, int index) {
                         finite = finite && is_bounded(triangle[0]) && is_bounded(triangle[1]) &&
                                  is_bounded(triangle[2]);
-                        Contact contact{.point = {}, .part = part, .index = index};
+                        Contact contact{.point = {}, .part = part, .index = index, .turn = turn++};
                         // The order of the two tests does not matter; the second one rarely fails.
                         if (!find_contact(sphere, triangle, &contact.point)) return;
                         if (dispatch_.ignores_separated && test.is_separated(triangle, support)) {
                           return;
                         }
-                        visit(contact);
+                        visit(contact, triangle);
                       });
     return finite;
   }
@@ -328,6 +450,12 @@ class ConcavePair {
 };
 
 }  // namespace
+
+bool commit_concave_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
+  const ConcaveFallback fallback = ConcavePair(dispatch, i).update_sphere_in_order(counts);
+  ++counts->concave_fallbacks[static_cast<std::size_t>(fallback)];
+  return fallback == ConcaveFallback::none;
+}
 
 bool commit_concave(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
   const SphereBatch& batch = dispatch.batch;

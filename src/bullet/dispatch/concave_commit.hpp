@@ -12,6 +12,9 @@ namespace bullet {
 /// algorithms; for other convex shapes, Bullet's btConvexConvexAlgorithm runs for each triangle.
 /// @return false, without a change, if Bullet must process the pair; `*counts` has the reason
 bool commit_concave(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
+/// The same for a sphere whose contacts the user's callbacks observe, on the thread that
+/// dispatches.
+bool commit_concave_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
 
 }  // namespace bullet
 }  // namespace JFPX_ABI

@@ -15,6 +15,7 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 
 #include <typeinfo>
 
@@ -92,6 +93,54 @@ void run_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
 }
 
 }  // namespace
+
+bool has_sphere(const SphereBatch& batch, std::size_t i) {
+  const btCollisionShape& a = *batch.body_a(i)->getCollisionShape();
+  const btCollisionShape& b = *batch.body_b(i)->getCollisionShape();
+  const auto are = [](const btCollisionShape& sphere, const btCollisionShape& other,
+                      bool is_plane) {
+    return is_exactly<btSphereShape>(sphere) &&
+           (is_plane ? is_exactly<btStaticPlaneShape>(other) : is_exactly<btBoxShape>(other));
+  };
+  switch (batch.kind(i)) {
+    case PairKind::convex:
+      return are(a, b, false) || are(b, a, false);
+    case PairKind::convex_plane:
+      return are(a, b, true);
+    case PairKind::plane_convex:
+      return are(b, a, true);
+    case PairKind::convex_concave:
+      return is_exactly<btSphereShape>(a) && b.isConcave();
+    case PairKind::concave_convex:
+      return is_exactly<btSphereShape>(b) && a.isConcave();
+    default:
+      return false;
+  }
+}
+
+void commit_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
+  const SphereBatch& batch = dispatch.batch;
+  const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
+  const bool sphere_first = a.getCollisionShape()->getShapeType() == SPHERE_SHAPE_PROXYTYPE;
+  switch (batch.kind(i)) {
+    case PairKind::convex:
+      if (update_sphere_box(batch.manifold(i), a, b, sphere_first)) {
+        ++counts->sphere_boxes;
+        return;
+      }
+      break;
+    case PairKind::convex_plane:
+    case PairKind::plane_convex:
+      if (update_sphere_plane(batch.manifold(i), a, b, sphere_first)) {
+        ++counts->sphere_planes;
+        return;
+      }
+      break;
+    default:
+      if (commit_concave_in_order(dispatch, i, counts)) return;
+  }
+  run_algorithm(dispatch, i);
+}
 
 CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
   sphere_pairs += other.sphere_pairs;

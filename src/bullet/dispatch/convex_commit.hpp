@@ -50,6 +50,12 @@ struct ConvexDispatch {
 /// @return false if Bullet must process the pair
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
 
+/// Whether commit_in_order() may process pair i: a sphere with a box, a plane, or a concave shape.
+/// Reads the current shapes of the bodies.
+bool has_sphere(const SphereBatch& batch, std::size_t i);
+/// Has the effect of the algorithm of pair i, also on callbacks, on the thread that dispatches.
+void commit_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
+
 }  // namespace bullet
 }  // namespace JFPX_ABI
 }  // namespace jfpx

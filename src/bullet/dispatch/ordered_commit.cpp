@@ -18,7 +18,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   Walk(const OrderedCommit& commit, btCollisionDispatcher& dispatcher,
        btOverlappingPairCache& cache, const btDispatcherInfo& info, const SphereBatch& batch,
        std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
-       const Visited& visited)
+       const ConvexDispatch* convex, const Visited& visited)
       : actions_(commit.actions_),
         contacts_(commit.contacts_),
         dispatcher_(dispatcher),
@@ -27,6 +27,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
         batch_(batch),
         pairs_(pairs),
         touching_(touching),
+        convex_(convex),
         visited_(visited) {}
 
   bool processOverlap(btBroadphasePair& pair) override {
@@ -47,7 +48,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     }
     return false;
   }
-  std::uint64_t written() const { return written_; }
+  const CommitCounts& counts() const { return counts_; }
 
  private:
   /// Prefetch distance: hides memory latency, and the prefetched lines stay in the cache.
@@ -95,7 +96,11 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
     switch (actions_[i]) {
       case Action::stock:
-        visit_stock(pair);
+        if (convex_ == nullptr || !has_sphere(batch_, i)) {
+          visit_stock(pair);
+        } else if (dispatcher_.needsCollision(a, b)) {
+          commit_in_order(*convex_, i, &counts_);
+        }
         return true;
       case Action::skip:
         return true;
@@ -116,7 +121,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
       return false;  // the near callback calls the filter itself and does not return its result
     }
     if (!dispatcher_.needsCollision(a, b)) return false;
-    ++written_;
+    ++counts_.written;
     if (!contacts_are_observed() && !calls_added(*a, *b)) {
       manifold->setNumContacts(0);
       // Reads the current materials, because callbacks may change those of their bodies.
@@ -165,8 +170,9 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   const SphereBatch& batch_;
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
+  const ConvexDispatch* convex_;
   const Visited& visited_;
-  std::uint64_t written_ = 0;
+  CommitCounts counts_;
   bool is_changed_ = false;  ///< Bullet processes all remaining pairs
 };
 
@@ -198,13 +204,14 @@ CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairC
   return counts;
 }
 
-std::uint64_t OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                                 const btDispatcherInfo& info, btDispatcher* argument,
-                                 const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
-                                 std::span<const PairContact> touching, const Visited& visited) {
-  Walk walk(*this, dispatcher, cache, info, batch, pairs, touching, visited);
+CommitCounts OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                                const btDispatcherInfo& info, btDispatcher* argument,
+                                const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
+                                std::span<const PairContact> touching, const ConvexDispatch* convex,
+                                const Visited& visited) {
+  Walk walk(*this, dispatcher, cache, info, batch, pairs, touching, convex, visited);
   cache.processAllOverlappingPairs(&walk, argument, info);
-  return walk.written();
+  return walk.counts();
 }
 
 }  // namespace bullet

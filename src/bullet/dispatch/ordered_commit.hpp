@@ -14,8 +14,9 @@ namespace bullet {
 
 /// One traversal of all pairs by the pair cache itself, so that the order is Bullet's for every
 /// class of cache. A touching pair of spheres is written in place, and the callbacks are called as
-/// Bullet's algorithm calls them. All other pairs, including those of other shapes, and all pairs
-/// after a callback has changed bodies or pairs, are passed to Bullet's near callback.
+/// Bullet's algorithm calls them, and so are spheres with boxes, planes and concave shapes. All
+/// other pairs, including those of other shapes, and all pairs after a callback has changed bodies
+/// or pairs, are passed to Bullet's near callback.
 class OrderedCommit {
  public:
   /// Called after the visit of each sphere pair. `current` is true if the manifold matches the
@@ -27,11 +28,12 @@ class OrderedCommit {
   /// dispatcher's class may override needsCollision(). Only this function itself can throw.
   CommitCounts plan(const SphereBatch& batch, std::span<const PairContact> touching,
                     bool may_override_filter);
-  /// @return the number of manifolds written.
-  std::uint64_t run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
-                    const btDispatcherInfo& info, btDispatcher* argument, const SphereBatch& batch,
-                    std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
-                    const Visited& visited);
+  /// @param convex null if Bullet must process all pairs but those of two spheres
+  /// @return the numbers of manifolds updated; those of plan() are 0
+  CommitCounts run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
+                   const btDispatcherInfo& info, btDispatcher* argument, const SphereBatch& batch,
+                   std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
+                   const ConvexDispatch* convex, const Visited& visited);
 
  private:
   enum class Action : std::uint8_t {
