@@ -327,7 +327,7 @@ TEST_F(ObservedTerrains, CallTheCallbacksOfStockBullet) {
   Random random(seed);
   std::uint64_t concaves = 0, boxes = 0, planes = 0;
   for (const Terrain terrain : {Terrain::triangles, Terrain::scaled_triangles, Terrain::heights}) {
-    for (int repeat = 0; repeat < 6; ++repeat) {
+    for (unsigned repeat = 0; repeat < 6; ++repeat) {
       const unsigned which = 1 + static_cast<unsigned>(random.below(31));
       g_disturbs = repeat % 2 == 1;
       Twins twins(all_parts(1 + repeat % 3, {.minimum_batch = 0}, {.minimum_batch = 0}));

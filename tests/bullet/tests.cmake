@@ -125,8 +125,13 @@ if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
   jfpx_add_executable(bullet_environment_program SOURCES bullet/environment_program.cpp
     LINK jfpx_bullet3rd Threads::Threads)
   # A program as its developers may build it. A sanitizer build of this project is one, too.
+  # clang links the run-time library statically, which then is the first of the program.
   set(with_asan "")
-  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+  include(CheckCXXCompilerFlag)
+  set(CMAKE_REQUIRED_LINK_OPTIONS -fsanitize=address)
+  check_cxx_compiler_flag(-fsanitize=address JFPX_COMPILER_HAS_ASAN)
+  unset(CMAKE_REQUIRED_LINK_OPTIONS)
+  if(JFPX_COMPILER_HAS_ASAN AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
     jfpx_add_executable(bullet_asan_program SOURCES bullet/stock_program.cpp
       LINK jfpx_bullet3rd Threads::Threads)
     foreach(target IN ITEMS bullet_asan_program bullet_asan_program_f64)
