@@ -58,7 +58,8 @@ class MeshRay {
       distance += weight * z[k];
     }
     if ((any_left && any_right) || area == 0) return -1;
-    distance /= area;
+    // In the plane of a tiny triangle, products underflow: the mean may be outside of its range.
+    distance = std::clamp(distance / area, std::min({z.x, z.y, z.z}), std::max({z.x, z.y, z.z}));
     return distance >= 0 ? distance : Real(-1);
   }
   const Vec3& direction() const { return direction_; }

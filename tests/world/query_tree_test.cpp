@@ -310,6 +310,32 @@ TEST(QueryTree, OverlapsAlongNearlyParallelEdgesFindWhatALinearScanFinds) {
   EXPECT_GT(apart, 100);
 }
 
+/// A ray in the plane of a tiny, flat heightfield: the distances of triangles ahead are lost to
+/// underflow.
+TEST(QueryTree, RaysInThePlaneOfATinyHeightfieldFindWhatALinearScanFinds) {
+  Scene scene;
+  BodyDef def;
+  HeightfieldDef flat;
+  flat.rows = 4, flat.columns = 6;
+  flat.spacing_x = flat.spacing_z = Real(1.17e-15);
+  flat.heights.resize(24);
+  def.shape = Heightfield(std::move(flat));
+  def.mass = 0;
+  def.position = {569878, -7945235, -12129068};
+  scene.bodies = {def};
+  const World world(scene);
+  const LinearQueries scan(world);
+  const Real least = std::numeric_limits<Real>::min();
+  for (const Real part : {Real(0.0811), Real(-0.0811), Real(1)}) {
+    const Real along_y = part * least;
+    Ray ray{def.position, {1, along_y, Real(0.9965) * least}};
+    for (const Real most : {Real(0), Real(1e-15), kInfinity}) {
+      ray.max_distance = most;
+      EXPECT_EQ(world.cast_ray_through(ray), scan.cast_ray_through(ray)) << along_y << ' ' << most;
+    }
+  }
+}
+
 TEST(QueryTree, AFilterIsCalledAtMostOnceForEachHitBody) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
