@@ -1,6 +1,7 @@
 /// Tests of worlds with heightfields: seams, equality with meshes, files.
 #include "src/scene/scene_json.hpp"
 #include "tests/world/random_bodies.hpp"
+#include "tests/world/sliders.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +13,8 @@
 namespace jfpx {
 namespace {
 
+using test::fixed_surface;
+using test::Slider;
 using test::operator""_r;
 
 Heightfield flat_heightfield(std::uint32_t vertices, Real spacing) {
@@ -23,21 +26,6 @@ Heightfield flat_heightfield(std::uint32_t vertices, Real spacing) {
                       {},
                       false});
 }
-BodyDef fixed_surface(Shape shape, Real friction) {
-  BodyDef def;
-  def.shape = std::move(shape);
-  def.mass = 0;
-  def.friction = friction;
-  return def;
-}
-
-/// A solid that lies on the plane y = 0, and moves in a direction of that plane.
-struct GridSlider {
-  const char* name;
-  Shape shape;
-  Real height;
-  Quat orientation = {};
-};
 
 TEST(HeightfieldWorld, NothingIsStoppedBySeamsOfAFlatHeightfield) {
   const Real half_turn = square_root(0.5_r);
@@ -48,40 +36,16 @@ TEST(HeightfieldWorld, NothingIsStoppedBySeamsOfAFlatHeightfield) {
     corners.push_back({0.4_r * static_cast<Real>(std::cos(angle)), 0.3_r * sign,
                        0.4_r * static_cast<Real>(std::sin(angle))});
   }
-  const GridSlider sliders[] = {
+  const Slider sliders[] = {
       {"ball", Sphere{0.5_r}, 0.5_r},
       {"box", Box{{0.5_r, 0.4_r, 0.3_r}}, 0.4_r},
       {"capsule", Capsule{0.25_r, 0.5_r}, 0.25_r, {half_turn, 0, 0, half_turn}},
       {"hull", centred(Hull(corners)), 0.3_r}};
   const Heightfield floor = flat_heightfield(61, 1);
-  for (const GridSlider& slider : sliders) {
-    for (const Real speed : {0.3_r, 1.0_r, 5.0_r, 20.0_r}) {
-      for (const Vec3& direction : {Vec3{1, 0, 0}, Vec3{0.6_r, 0, 0.8_r}}) {
-        SCOPED_TRACE(std::string(slider.name) + " at " + std::to_string(speed));
-        Scene scene;
-        scene.sleep.enabled = false;
-        scene.bodies.push_back(fixed_surface(floor, 0));
-        BodyDef body;
-        body.shape = slider.shape;
-        body.orientation = slider.orientation;
-        body.friction = 0;
-        body.position = Vec3{0.13_r, slider.height, 0.21_r} - direction * 20;
-        body.velocity = direction * speed;
-        scene.bodies.push_back(body);
-        World world(scene);
-        Real most = 0;
-        const int steps = speed < 1 ? 900 : static_cast<int>(40 * 60 / speed);
-        for (int n = 0; n < steps; ++n) {
-          world.step();
-          const Real height = world.state(world.bodies()[1]).position.y;
-          most = std::max(most, absolute(height - slider.height));
-        }
-        const bool is_round = std::holds_alternative<Sphere>(slider.shape) ||
-                              std::holds_alternative<Capsule>(slider.shape);
-        EXPECT_LT(most, is_round ? 0.001_r : 0.005_r);
-        EXPECT_NEAR(length(world.state(world.bodies()[1]).velocity), speed, 0.005_r * speed);
-      }
-    }
+  for (const Slider& slider : sliders) {
+    const bool is_round = std::holds_alternative<Sphere>(slider.shape) ||
+                          std::holds_alternative<Capsule>(slider.shape);
+    test::expect_to_slide(slider, floor, is_round ? 0.001_r : 0.005_r);
   }
 }
 

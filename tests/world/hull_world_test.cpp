@@ -142,7 +142,7 @@ TEST(HullWorld, AHullSlidesOverTheSeamsOfAFlatMesh) {
   for (const Real speed : {0.3_r, 5.0_r, 20.0_r}) {
     Scene scene;
     scene.sleep.enabled = false;
-    scene.bodies.push_back(test::fixed_mesh(floor, 0));
+    scene.bodies.push_back(test::fixed_surface(floor, 0));
     BodyDef body = body_with(prism(12, 0.5_r, 0.3_r), {-15.87_r, 0.3_r, -11.8_r});
     body.friction = 0;
     body.velocity = Vec3{0.8_r, 0, 0.6_r} * speed;

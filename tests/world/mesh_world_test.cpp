@@ -1,6 +1,6 @@
 /// Tests of worlds with triangle meshes: seams, rest, rotating meshes, queries and files.
 #include "src/scene/scene_json.hpp"
-#include "tests/world/meshes.hpp"
+#include "tests/world/sliders.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,18 +11,11 @@
 namespace jfpx {
 namespace {
 
-using test::fixed_mesh;
+using test::fixed_surface;
 using test::flat_grid;
 using test::grid;
+using test::Slider;
 using test::operator""_r;
-
-/// A solid that lies on the plane y = 0, and moves in a direction of that plane.
-struct Slider {
-  const char* name;
-  Shape shape;
-  Real height;
-  Quat orientation = {};
-};
 
 TEST(MeshWorld, NothingIsStoppedBySeamsOfAFlatMesh) {
   const Real half_turn = square_root(0.5_r);
@@ -31,38 +24,12 @@ TEST(MeshWorld, NothingIsStoppedBySeamsOfAFlatMesh) {
       {"box", Box{{0.5_r, 0.4_r, 0.3_r}}, 0.4_r},
       {"capsule", Capsule{0.25_r, 0.5_r}, 0.25_r, {half_turn, 0, 0, half_turn}}};
   const TriangleMesh floor = flat_grid(60, 1);
-  for (const Slider& slider : sliders) {
-    for (const Real speed : {0.3_r, 1.0_r, 5.0_r, 20.0_r}) {
-      for (const Vec3& direction : {Vec3{1, 0, 0}, Vec3{0.6_r, 0, 0.8_r}}) {
-        SCOPED_TRACE(std::string(slider.name) + " at " + std::to_string(speed));
-        Scene scene;
-        scene.sleep.enabled = false;
-        scene.bodies.push_back(fixed_mesh(floor, 0));
-        BodyDef body;
-        body.shape = slider.shape;
-        body.orientation = slider.orientation;
-        body.friction = 0;
-        body.position = Vec3{0.13_r, slider.height, 0.21_r} - direction * 20;
-        body.velocity = direction * speed;
-        scene.bodies.push_back(body);
-        World world(scene);
-        Real most = 0;
-        const int steps = speed < 1 ? 900 : static_cast<int>(40 * 60 / speed);
-        for (int n = 0; n < steps; ++n) {
-          world.step();
-          const Real height = world.state(world.bodies()[1]).position.y;
-          most = std::max(most, absolute(height - slider.height));
-        }
-        EXPECT_LT(most, 0.001_r);
-        EXPECT_NEAR(length(world.state(world.bodies()[1]).velocity), speed, 0.005_r * speed);
-      }
-    }
-  }
+  for (const Slider& slider : sliders) test::expect_to_slide(slider, floor, 0.001_r);
 }
 
 TEST(MeshWorld, ABallRollsOverSeamsAtConstantSpeed) {
   Scene scene;
-  scene.bodies.push_back(fixed_mesh(flat_grid(60, 1), 0.8_r));
+  scene.bodies.push_back(fixed_surface(flat_grid(60, 1), 0.8_r));
   BodyDef body = test::ball({-20, 0.5_r, 0.3_r}, 0.5_r);
   body.velocity = {5, 0, 0};
   body.angular_velocity = {0, 0, -10};
@@ -80,7 +47,7 @@ TEST(MeshWorld, ABallRollsOverSeamsAtConstantSpeed) {
 /// An edge is no seam if the surface rises there.
 TEST(MeshWorld, AStepOfTheMeshStopsABall) {
   Scene scene;
-  scene.bodies.push_back(fixed_mesh(
+  scene.bodies.push_back(fixed_surface(
       grid(40, 0.5_r, [](std::uint32_t x, std::uint32_t) { return x > 20 ? 2.0_r : 0.0_r; }), 0));
   BodyDef body = test::ball({-4, 0.3_r, 0.3_r}, 0.3_r);
   body.velocity = {4, 0, 0};
@@ -103,13 +70,13 @@ TEST(MeshWorld, BodiesComeToRestOnARoughMesh) {
   Random random(seed);
   Scene scene;
   // A bowl, so that nothing rolls over the rim.
-  scene.bodies.push_back(
-      fixed_mesh(grid(30, 0.7_r,
-                      [&random](std::uint32_t x, std::uint32_t z) {
-                        const Real dx = static_cast<Real>(x) - 15, dz = static_cast<Real>(z) - 15;
-                        return random.uniform(-0.2_r, 0.2_r) + 0.03_r * (dx * dx + dz * dz);
-                      }),
-                 0.6_r));
+  scene.bodies.push_back(fixed_surface(
+      grid(30, 0.7_r,
+           [&random](std::uint32_t x, std::uint32_t z) {
+             const Real dx = static_cast<Real>(x) - 15, dz = static_cast<Real>(z) - 15;
+             return random.uniform(-0.2_r, 0.2_r) + 0.03_r * (dx * dx + dz * dz);
+           }),
+      0.6_r));
   for (int i = 0; i < 60; ++i) {
     BodyDef body;
     if (i % 3 == 0) body.shape = Sphere{0.3_r};
@@ -163,7 +130,7 @@ TriangleMesh drum(Real radius, Real length) {
 
 TEST(MeshWorld, ARotatingDrumKeepsItsContent) {
   Scene scene;
-  BodyDef shell = fixed_mesh(drum(1, 0.8_r), 0.5_r);
+  BodyDef shell = fixed_surface(drum(1, 0.8_r), 0.5_r);
   shell.kinematic = true;
   shell.angular_velocity = {0, 0, 2};
   scene.bodies.push_back(shell);
@@ -194,7 +161,7 @@ TEST(MeshWorld, ARotatingDrumKeepsItsContent) {
 
 TEST(MeshWorld, AMovableBodyCannotBeAMesh) {
   Scene scene;
-  scene.bodies.push_back(fixed_mesh(flat_grid(1, 1), 0));
+  scene.bodies.push_back(fixed_surface(flat_grid(1, 1), 0));
   scene.bodies[0].mass = 1;
   try {
     validate(scene);
@@ -208,7 +175,7 @@ TEST(MeshWorld, AMovableBodyCannotBeAMesh) {
 
 TEST(MeshWorld, JsonPreservesMeshesAndNamesTheirFaults) {
   Scene scene;
-  BodyDef body = fixed_mesh(
+  BodyDef body = fixed_surface(
       grid(3, 0.1_r, [](std::uint32_t x, std::uint32_t z) { return static_cast<Real>(x * z) / 7; }),
       0.3_r);
   scene.bodies = {body, body};

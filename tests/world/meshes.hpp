@@ -1,4 +1,4 @@
-/// Grids of triangles as bodies of tests.
+/// Surfaces of triangles as bodies of tests.
 #pragma once
 
 #include "tests/world/support.hpp"
@@ -37,9 +37,10 @@ inline TriangleMesh grid(std::uint32_t cells, Real size,
 inline TriangleMesh flat_grid(std::uint32_t cells, Real size) {
   return grid(cells, size, [](std::uint32_t, std::uint32_t) { return 0.0_r; });
 }
-inline BodyDef fixed_mesh(TriangleMesh mesh, Real friction) {
+/// An immovable body with a TriangleMesh or a Heightfield.
+inline BodyDef fixed_surface(Shape shape, Real friction) {
   BodyDef def;
-  def.shape = std::move(mesh);
+  def.shape = std::move(shape);
   def.mass = 0;
   def.friction = friction;
   return def;
