@@ -222,6 +222,18 @@ TEST(SceneWorld, HeightfieldsAreWhereTheNativeWorldHasThem) {
   }
 }
 
+TEST(SceneWorld, ABallFallsThroughAHeightfieldOfHoles) {
+  Scene scene;
+  scene.bodies = {ball({0, 1, 0})};
+  BodyDef fixed;
+  fixed.mass = 0;
+  fixed.shape = Heightfield({2, 3, 1, 1, std::vector<Real>(6, 0), {0, 2}, false});
+  scene.bodies.push_back(fixed);
+  SceneWorld world(scene);
+  for (int i = 0; i < 120; ++i) world.step();
+  EXPECT_LT(world.states()[0].position.y, -1);
+}
+
 /// An angle of two bars, whose inertia tensor is not diagonal.
 BodyDef angle_iron(const Vec3& position) {
   BodyDef def = ball(position);

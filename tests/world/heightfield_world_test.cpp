@@ -57,6 +57,8 @@ TEST(HeightfieldWorld, BodiesMoveAsOnTheMesh) {
   std::size_t contacts = 0;
   for (int run = 0; run < 16; ++run) {
     const Heightfield ground(test::random_heightfield(&random, 30));
+    const TriangleMesh mesh = to_triangle_mesh(ground);
+    if (mesh.triangles().empty()) continue;  // all cells are holes
     Scene scene;
     scene.bodies.push_back(fixed_surface(ground, 0.5_r));
     if (run % 2 == 1) {
@@ -74,7 +76,7 @@ TEST(HeightfieldWorld, BodiesMoveAsOnTheMesh) {
       scene.bodies.push_back(body);
     }
     Scene twin = scene;
-    twin.bodies[0].shape = to_triangle_mesh(ground);
+    twin.bodies[0].shape = mesh;
     World world(scene), other(twin);
     for (int n = 0; n < 60; ++n) {
       world.step();

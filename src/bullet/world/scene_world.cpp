@@ -16,6 +16,7 @@
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
+#include <BulletCollision/CollisionShapes/btEmptyShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -102,7 +103,13 @@ class ShapeStore {
   /// the heights is symmetric, because Bullet moves its middle to the origin.
   btCollisionShape* make(const Heightfield& heightfield, const btTransform& axes) {
     const HeightfieldDef& def = heightfield.def();
-    if (!def.holes.empty()) return make(to_triangle_mesh(heightfield), axes);
+    if (!def.holes.empty()) {
+      const TriangleMesh mesh = to_triangle_mesh(heightfield);
+      if (!mesh.triangles().empty()) return make(mesh, axes);
+      // Bullet cannot build the tree of a mesh without triangles.
+      shapes_.emplace_back(new btEmptyShape);
+      return shapes_.back().get();
+    }
     if (share_) {
       const auto found = shared_heightfields_.find(heightfield.data());
       if (found != shared_heightfields_.end()) return found->second;
