@@ -8,6 +8,7 @@
 #include "src/base/cuda/probe.hpp"
 #include "src/sphere_collider/cuda/pair_list_search.hpp"
 #include "src/sphere_collider/cuda/search.hpp"
+#include "src/sphere_collider/cuda/tuning.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
 
 #include <algorithm>
