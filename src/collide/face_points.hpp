@@ -10,13 +10,14 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
 
-/// Selects at most eight of any number of points of a contact: those that are farthest in eight
-/// directions of its plane, and the deepest one. Of points that are equally far, the first is kept,
-/// so that the selection depends on the order of the points alone.
-class PointSelection {
+/// Selects some of any number of points of a contact: those that are farthest in four or eight
+/// directions of its plane, and the deepest one; at most five or eight. Of points that are equally
+/// far, the first is kept, so that the selection depends on the order of the points alone.
+template <int kDirections>
+class DirectedSelection {
  public:
   /// @param normal unit, of the contact
-  JFPX_HD explicit PointSelection(const Vec3& normal) {
+  JFPX_HD explicit DirectedSelection(const Vec3& normal) {
     const ContactBasis basis = contact_basis(normal);
     tangent_ = basis.tangent;
     bitangent_ = basis.bitangent;
@@ -26,11 +27,12 @@ class PointSelection {
     constexpr Real kDiagonal = Real(0.70710678118654752440);
     const Real u = dot(tangent_, point), v = dot(bitangent_, point);
     const Real p = (u + v) * kDiagonal, q = (u - v) * kDiagonal;
-    const Real reach[kDirections] = {u, p, v, -q, -u, -p, -v, q};
+    const Real reach[8] = {u, p, v, -q, -u, -p, -v, q};
     const Item item{point, distance, feature};
     for (int i = 0; i < kDirections; ++i) {
-      if (count_ == 0 || reach[i] > reach_[i]) {
-        reach_[i] = reach[i];
+      const Real along = reach[i * (8 / kDirections)];
+      if (count_ == 0 || along > reach_[i]) {
+        reach_[i] = along;
         items_[i] = item;
       }
     }
@@ -43,7 +45,7 @@ class PointSelection {
   template <class Visit>
   JFPX_HD void visit(const Visit& visit) const {
     if (count_ == 0) return;
-    Item chosen[kDirections];
+    Item chosen[kMost];
     int size = 0;
     bool has_deepest = false;
     for (int i = 0; i < kDirections; ++i) {
@@ -53,13 +55,13 @@ class PointSelection {
       chosen[size++] = items_[i];
       has_deepest |= items_[i].feature == deepest_.feature;
     }
-    if (!has_deepest) chosen[size < kDirections ? size++ : kDirections - 1] = deepest_;
+    if (!has_deepest) chosen[size < kMost ? size++ : kMost - 1] = deepest_;
     for (int k = 0; k < size; ++k) visit(chosen[k].point, chosen[k].distance, chosen[k].feature);
   }
 
  private:
-  static constexpr int kDirections = 8;
-  static_assert(kDirections == PairManifold::kMaxPoints);
+  static constexpr int kMost = kDirections == 4 ? 5 : 8;
+  static_assert((kDirections == 4 || kDirections == 8) && kMost <= PairManifold::kMaxPoints);
   struct Item {
     Vec3 point;
     Real distance = 0;
@@ -70,6 +72,7 @@ class PointSelection {
   Item items_[kDirections], deepest_;
   int count_ = 0;
 };
+using PointSelection = DirectedSelection<8>;
 
 /// Numbers of the points of two faces, unique for the pair of faces: a corner of the incident face,
 /// its crossing with side j of the reference face, or a corner of the reference face.

@@ -48,10 +48,15 @@ struct PairManifold {
   };
   Vec3 normal;  ///< unit, from b to a
   std::uint32_t point_count = 0, touch_count = 0;
+  /// Whether the contact of two solids with flat faces is between such faces, and may be recycled.
+  bool is_steady = true;
   SolverPoint points[kMaxPoints];
   Touch touches[kMaxPoints];
 
-  JFPX_HD void clear() { point_count = touch_count = 0; }
+  JFPX_HD void clear() {
+    point_count = touch_count = 0;
+    is_steady = true;
+  }
   /// Adds a solver point, and a touch if the distance is <= 0. @param touch middle of the overlap
   JFPX_HD void add(const Vec3& arm_a, const Vec3& arm_b, Real distance, std::uint32_t feature,
                    const Vec3& touch) {

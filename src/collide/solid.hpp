@@ -67,9 +67,9 @@ void for_each_part(const Shape& shape, const Visit& visit) {
   std::visit(visit_parts, shape);
 }
 
-/// Whether the surface of a solid consists of flat faces. Contacts of two such solids are recycled.
+/// Whether a solid has flat faces. Contacts of flat faces of two such solids are recycled.
 template <class S>
-inline constexpr bool kIsPolyhedron = false;
+inline constexpr bool kHasFlatFaces = false;
 
 /// Whether S is a solid, as opposed to a half-space, a plane or a mesh.
 template <class S>

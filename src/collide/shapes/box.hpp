@@ -11,7 +11,7 @@ namespace detail {
 template <>
 inline constexpr const char* kShapeName<Box> = "box";
 template <>
-inline constexpr bool kIsPolyhedron<Box> = true;
+inline constexpr bool kHasFlatFaces<Box> = true;
 
 JFPX_HD inline Solid to_solid(const Box& box) { return {box.half_extents, 0}; }
 JFPX_HD inline Box from_solid(const Solid& solid, std::type_identity<Box>) {

@@ -14,7 +14,7 @@ namespace detail {
 template <>
 inline constexpr const char* kShapeName<Hull> = "hull";
 template <>
-inline constexpr bool kIsPolyhedron<Hull> = true;
+inline constexpr bool kHasFlatFaces<Hull> = true;
 
 /// A hull in flat arrays, in host memory or on a device.
 struct HullReference {
@@ -138,9 +138,9 @@ JFPX_HD inline void find_contact(const Posed<HullReference>& a, const HalfSpace&
 
 /// The contact points of a, in its axes, as points of a manifold.
 /// @param shift motion of a at the time of the points
-JFPX_HD inline void add_selected(const PointSelection& selection, const Transform& pose_a,
-                                 const Vec3& shift, const PairMotion& pair,
-                                 PairManifold* manifold) {
+template <int kDirections>
+JFPX_HD void add_selected(const DirectedSelection<kDirections>& selection, const Transform& pose_a,
+                          const Vec3& shift, const PairMotion& pair, PairManifold* manifold) {
   const Real gap = -dot(shift, manifold->normal);
   selection.visit([&](const Vec3& local, Real distance, std::uint32_t feature) {
     const Vec3 point = transform_point(pose_a, local);

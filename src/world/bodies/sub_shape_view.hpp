@@ -88,12 +88,12 @@ struct SubShapeView {
   JFPX_HD bool is_sphere(SubShape i) const { return i < ranges.spheres(); }
   JFPX_HD bool is_wall(SubShape i) const { return i >= ranges.bounded(); }
   JFPX_HD bool is_mesh(SubShape i) const { return i >= ranges.meshes_begin() && !is_wall(i); }
-  JFPX_HD bool is_polyhedron(SubShape i) const {
+  JFPX_HD bool has_flat_faces(SubShape i) const {
     if (is_wall(i)) return false;
     if (is_mesh(i)) return true;
     bool result = false;
     detail::SolidKinds::visit(SubShapeRanges::kind_of_range(ranges.range_of(i)), [&](auto type) {
-      result = detail::kIsPolyhedron<typename decltype(type)::type>;
+      result = detail::kHasFlatFaces<typename decltype(type)::type>;
     });
     return result;
   }

@@ -25,8 +25,8 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
                     ? pair.element
                     : bounds.sub_shapes.part(pair.sub_shape_b)};
   found->clear();
-  const bool is_recyclable = bounds.sub_shapes.is_polyhedron(pair.sub_shape_a) &&
-                             bounds.sub_shapes.is_polyhedron(pair.sub_shape_b);
+  const bool is_recyclable = bounds.sub_shapes.has_flat_faces(pair.sub_shape_a) &&
+                             bounds.sub_shapes.has_flat_faces(pair.sub_shape_b);
   if (is_recyclable) {
     const soft_step::ManifoldInput* last = find_last(found->key);
     if (last != nullptr && recycle(bounds, pair, *last, last_points, found)) return;
@@ -41,7 +41,7 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
   find_contact(bounds.sub_shapes, pair.sub_shape_a, pair.sub_shape_b, pair.element, centre,
                {motion, margin, limit, centre, bodies.position[pair.b]}, found);
   if (bodies.sensor[pair.a] != 0 || bodies.sensor[pair.b] != 0) found->point_count = 0;
-  if (is_recyclable && found->point_count > 0) note_test(bodies, found);
+  if (is_recyclable && found->is_steady && found->point_count > 0) note_test(bodies, found);
 }
 
 }  // namespace JFPX_ABI
