@@ -32,6 +32,14 @@ struct Capsule {
   friend bool operator==(const Capsule&, const Capsule&) = default;
 };
 
+/// A solid cylinder: all points within `radius` of the y axis of its body, and within `half_height`
+/// of its middle.
+struct Cylinder {
+  Real radius = Real(0.5);       ///< [m], > 0
+  Real half_height = Real(0.5);  ///< [m], > 0
+  friend bool operator==(const Cylinder&, const Cylinder&) = default;
+};
+
 /// A solid half-space: all points p with dot(normal, p) <= offset, in world coordinates. It ignores
 /// the pose of its body.
 struct HalfSpace {
@@ -50,7 +58,7 @@ struct Plane {
 };
 
 /// The shapes that have a volume, and that can be parts of compounds.
-using SolidShape = std::variant<Sphere, Box, Capsule, Hull>;
+using SolidShape = std::variant<Sphere, Box, Capsule, Hull, Cylinder>;
 
 /// A solid of a compound, with its pose in the axes of the body.
 struct CompoundPart {
@@ -74,8 +82,8 @@ struct Compound {
 /// @param compound each part must be in the ranges that validate() requires
 JFPX_API Compound centred(Compound compound);
 
-using Shape =
-    std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh, Hull, Heightfield>;
+using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh, Hull,
+                           Heightfield, Cylinder>;
 
 /// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

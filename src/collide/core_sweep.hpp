@@ -25,6 +25,10 @@ JFPX_HD inline Separation point_separation(const Vec3& p, const Capsule& capsule
   if (!(distance > capsule.radius)) return {};
   return {offset * (Real(1) / distance), distance - capsule.radius};
 }
+template <Round S>
+JFPX_HD Separation point_separation(const Vec3& p, const S& solid) {
+  return closest_to(to_frustum(solid), p);
+}
 JFPX_HD inline Separation point_separation(const Vec3& p, const HullReference& hull) {
   const HullPoint closest = closest_to(*hull.hull, p);
   return {closest.normal, closest.distance};

@@ -108,6 +108,9 @@ class Drawing {
       add_box(centre, solid.half_extents, turn, paint);
     } else if constexpr (std::is_same_v<S, Hull>) {
       add_mesh(mesh_of(solid), centre, turn, 2 * solid.data().view.outer_radius, paint);
+    } else if constexpr (jfpx::detail::Round<S>) {
+      const jfpx::detail::Frustum frustum = jfpx::detail::to_frustum(solid);
+      add_mesh(mesh_of(frustum), centre, turn, 2 * frustum.outer_radius(), paint);
     } else {
       const jfpx::detail::Solid rounded = jfpx::detail::to_solid(solid);
       add_rounded(centre, rounded.half_extents, rounded.radius, turn, paint);

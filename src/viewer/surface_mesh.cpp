@@ -1,9 +1,12 @@
-/// Triangulation of hulls and heightfields.
+/// Triangulation of hulls, round solids and heightfields.
 #include "src/viewer/surface_mesh.hpp"
 
 #include "src/collide/shapes.hpp"
 
+#include <array>
+#include <cmath>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <type_traits>
@@ -25,6 +28,31 @@ TriangleMesh mesh_of(const Hull& hull) {
     const auto corners = hull.corners(face);
     for (std::size_t k = 2; k < corners.size(); ++k) {
       def.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+    }
+  }
+  return mesh = TriangleMesh(std::move(def));
+}
+
+TriangleMesh mesh_of(const jfpx::detail::Frustum& frustum) {
+  constexpr std::uint32_t kSides = 32;
+  static std::mutex mutex;
+  static std::map<std::array<Real, 4>, TriangleMesh> meshes;
+  const std::lock_guard lock(mutex);
+  TriangleMesh& mesh =
+      meshes[{frustum.lower, frustum.upper, frustum.lower_radius, frustum.upper_radius}];
+  if (mesh.data() != nullptr) return mesh;
+  TriangleMeshDef def{{{0, frustum.lower, 0}, {0, frustum.upper, 0}}, {}, false};
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const Real angle = 2 * kPi * static_cast<Real>(i) / kSides;
+    const Vec3 radial{std::cos(angle), 0, -std::sin(angle)};
+    def.vertices.push_back(frustum.rim_point(false, radial));
+    def.vertices.push_back(frustum.rim_point(true, radial));
+  }
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const std::uint32_t a = 2 + 2 * i, b = 2 + 2 * ((i + 1) % kSides);
+    def.triangles.insert(def.triangles.end(), {{0, b, a}, {a, b, b + 1}});
+    if (frustum.cap_count() == 2) {
+      def.triangles.insert(def.triangles.end(), {{1, a + 1, b + 1}, {a, b + 1, a + 1}});
     }
   }
   return mesh = TriangleMesh(std::move(def));

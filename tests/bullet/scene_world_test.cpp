@@ -234,6 +234,35 @@ TEST(SceneWorld, ABallFallsThroughAHeightfieldOfHoles) {
   EXPECT_LT(world.states()[0].position.y, -1);
 }
 
+/// A standing and a lying cylinder come to rest where they do in the native world.
+TEST(SceneWorld, RoundSolidsRestWhereTheNativeWorldHasThem) {
+  Scene scene;
+  BodyDef ground;
+  ground.mass = 0;
+  ground.shape = Box{{5, 1, 5}};
+  ground.position = {0, -1, 0};
+  scene.bodies = {ground};
+  const auto add = [&](const Shape& shape, const Vec3& position, const Quat& orientation) {
+    BodyDef def = ball(position);
+    def.shape = shape;
+    def.orientation = orientation;
+    scene.bodies.push_back(def);
+  };
+  add(Cylinder{Real(0.4), Real(0.6)}, {-2, Real(0.62), 0}, {});
+  add(Cylinder{Real(0.4), Real(0.6)}, {2, Real(0.42), 0}, normalized(Quat{1, 1, 0, 0}));
+  SceneWorld world(scene);
+  World native(scene);
+  for (int i = 0; i < 240; ++i) {
+    world.step();
+    native.step();
+  }
+  const std::vector<BodyState> states = world.states();
+  for (std::size_t i = 1; i < scene.bodies.size(); ++i) {
+    const Vec3 expected = native.state(native.bodies()[i]).position;
+    EXPECT_LT(length(states[i].position - expected), Real(0.02)) << i;
+  }
+}
+
 /// An angle of two bars, whose inertia tensor is not diagonal.
 BodyDef angle_iron(const Vec3& position) {
   BodyDef def = ball(position);

@@ -58,18 +58,19 @@ class ContactOracle {
       return heightfield != nullptr ? detail::view_of(*heightfield)
                                     : detail::view_of(std::get<TriangleMesh>(shape));
     }
-    /// Order of the kinds: spheres, boxes, capsules, hulls, meshes, walls.
+    /// Order of the kinds: that of SolidShape, meshes, walls.
     int kind() const {
-      if (is_sphere()) return 0;
-      if (std::holds_alternative<Box>(shape)) return 1;
-      if (std::holds_alternative<Capsule>(shape)) return 2;
-      return is_mesh() ? 4 : is_wall() ? 5 : 3;
+      constexpr int kSolids = static_cast<int>(std::variant_size_v<SolidShape>);
+      if (is_mesh()) return kSolids;
+      return is_wall() ? kSolids + 1 : static_cast<int>(solid().index());
     }
     SolidShape solid() const {
-      if (is_sphere()) return std::get<Sphere>(shape);
-      if (const auto* box = std::get_if<Box>(&shape)) return *box;
-      if (const auto* hull = std::get_if<Hull>(&shape)) return *hull;
-      return std::get<Capsule>(shape);
+      SolidShape result;
+      const auto copy = [&](const auto& s) {
+        if constexpr (std::is_constructible_v<SolidShape, decltype(s)>) result = s;
+      };
+      std::visit(copy, shape);
+      return result;
     }
     SphereInstance sphere() const { return {pose.origin, std::get<Sphere>(shape).radius}; }
   };

@@ -97,6 +97,8 @@ TEST(TriangleMesh, ContactsOfOneTriangleAreThoseOfTheOracle) {
     const TriangleMesh mesh(v, {{0, 1, 2}}, true);
     const Transform pose = make_transform(test::random_rotation(&random), {});
     const SolidShape solid = test::random_sub_shape(&random);
+    const auto is_round = [](const auto& s) { return detail::Round<std::decay_t<decltype(s)>>; };
+    if (std::visit(is_round, solid)) continue;  // see round_contact_test.cpp
     const Transform at = make_transform(test::random_rotation(&random),
                                         random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
     RoundedPoints a(solid, at), b(Sphere{1}, pose);

@@ -32,14 +32,21 @@ Vec3 draw_direction(Bytes& bytes) {
 Sphere draw_sphere(Bytes& bytes) { return {bytes.number(Real(0.1), Real(1.5))}; }
 Box draw_box(Bytes& bytes) { return {bytes.vector(Real(0.1), Real(1.5))}; }
 
+Cylinder draw_cylinder(Bytes& bytes) {
+  const Real radius = bytes.number(Real(0.01), 1);
+  return {radius, bytes.number(Real(0.01), 1)};
+}
+
 Compound draw_compound(Bytes& bytes) {
   Compound compound;
   for (std::uint64_t n = bytes.below(4); n > 0; --n) {
     CompoundPart part;
     if (bytes.chance(Real(0.5))) {
       part.shape = draw_sphere(bytes);
-    } else {
+    } else if (bytes.chance(Real(0.7))) {
       part.shape = draw_box(bytes);
+    } else {
+      part.shape = draw_cylinder(bytes);
     }
     part.position = bytes.vector(-2, 2);
     part.orientation = draw_orientation(bytes);
@@ -88,7 +95,7 @@ Heightfield draw_heightfield(Bytes& bytes) {
 }
 
 Shape draw_shape(Bytes& bytes) {
-  switch (bytes.below(13)) {
+  switch (bytes.below(14)) {
     case 0:
     case 1:
       return draw_box(bytes);
@@ -119,6 +126,8 @@ Shape draw_shape(Bytes& bytes) {
       } catch (const InvalidArgument&) {
         return draw_box(bytes);
       }
+    case 13:
+      return draw_cylinder(bytes);
     default:
       return draw_sphere(bytes);
   }

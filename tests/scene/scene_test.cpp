@@ -390,9 +390,9 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
               HasSubstr("body 0.position: must be an array of 3 numbers"));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"mass": 1}]})"),
               HasSubstr("body 0: has no field \"shape\""));
-  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "cone"}}]})"),
-              HasSubstr("\"cone\"; it must be sphere, box, half_space, plane, compound, capsule, "
-                        "triangle_mesh, hull or heightfield"));
+  EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "torus"}}]})"),
+              HasSubstr("\"torus\"; it must be sphere, box, half_space, plane, compound, capsule, "
+                        "triangle_mesh, hull, heightfield or cylinder"));
   const auto with_parts = [](const std::string& parts) {
     return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "compound", "parts": )" + parts +
            "}}]}";
@@ -401,7 +401,7 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
   EXPECT_THAT(complaint(with_parts("[]")), HasSubstr("body 0: parts is empty"));
   EXPECT_THAT(complaint(with_parts(R"([{"shape": {"type": "plane"}}])")),
               HasSubstr("body 0.shape.parts[0].shape.type: is \"plane\"; it must be sphere, box, "
-                        "capsule or hull"));
+                        "capsule, hull or cylinder"));
   EXPECT_THAT(complaint(with_parts(R"([{"shape": {"type": "sphere", "radius": -1}}])")),
               HasSubstr("body 0: parts[0].radius is -1; it must be > 0"));
   EXPECT_THAT(complaint(with_body("\"can_sleep\": 1")), HasSubstr("must be a boolean"));

@@ -30,6 +30,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/capsule_world_test.cpp
   world/contact_events_test.cpp
   world/contact_generator_test.cpp
+  world/cylinder_world_test.cpp
   world/erratum_test.cpp
   world/filter_test.cpp
   world/force_registry_test.cpp

@@ -17,6 +17,7 @@
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btEmptyShape.h>
+#include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -58,6 +59,12 @@ btCollisionShape* bullet_shape(const Box& box) {
 
 btCollisionShape* bullet_shape(const Capsule& capsule) {
   return new btCapsuleShape(capsule.radius, 2 * capsule.half_height);
+}
+/// Bullet rounds the rims within its margin; a small one keeps them nearly sharp.
+btCollisionShape* bullet_shape(const Cylinder& cylinder) {
+  auto* shape = new btCylinderShape({cylinder.radius, cylinder.half_height, cylinder.radius});
+  shape->setMargin(detail::least_half_width(cylinder) * btScalar(0.01));
+  return shape;
 }
 
 /// Creates and owns shapes; if they are shared, equal shapes are created once.

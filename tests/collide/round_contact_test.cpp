@@ -1,0 +1,330 @@
+/// Contacts of cylinders against the separation of an oracle in double, their rays against sphere
+/// tracing, mass and submerged volume against sums over small cells.
+#include <jfpx/collide.hpp>
+
+#include "tests/collide/support_oracle.hpp"
+#include "tests/world/meshes.hpp"
+#include "tests/world/random_bodies.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace jfpx {
+namespace {
+
+using test::operator""_r;
+using test::operator-;
+using test::Point;
+using test::SupportSolid;
+using test::to_point;
+
+SolidShape round_solid(Random* random) {
+  return Cylinder{random->uniform(0.05_r, 0.8_r), random->uniform(0.05_r, 0.8_r)};
+}
+constexpr int kPartners = 5;
+SolidShape partner(std::uint64_t kind, Random* random) {
+  if (kind == 0) return Sphere{random->uniform(0.1_r, 0.8_r)};
+  if (kind == 1) return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.7_r, 0.7_r, 0.7_r})};
+  if (kind == 2) return Capsule{random->uniform(0.05_r, 0.5_r), random->uniform(0.05_r, 0.9_r)};
+  if (kind == 3) return test::random_hull(random);
+  return round_solid(random);
+}
+/// A random rotation, or one of an axis near an axis of the world.
+Quat random_tilt(Random* random) {
+  if (random->below(2) == 0) return test::random_rotation(random);
+  const Quat quarters[] = {{}, {1, 1, 0, 0}, {1, 0, 0, 1}};
+  const Quat q = normalized(quarters[random->below(3)]);
+  const Real angle = random->below(3) == 0 ? Real(0) : random->uniform(0, 0.08_r);
+  return normalized(add_scaled(q, test::random_direction(random), angle));
+}
+
+detail::PairManifold contact_between(const SolidShape& a, const Transform& pose_a,
+                                     const SolidShape& b, const Transform& pose_b,
+                                     const detail::PairMotion& pair = {}) {
+  detail::PairManifold found;
+  const auto test = [&](const auto& x, const auto& y) {
+    detail::find_contact_of_any(detail::instance(x, pose_a), detail::instance(y, pose_b), pair,
+                                &found);
+  };
+  std::visit(test, a, b);
+  return found;
+}
+
+TEST(RoundContact, HasTheSeparationOfTheOracleWithEverySolid) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int touching[kPartners] = {}, near[kPartners] = {}, clear[kPartners] = {};
+  int shallow_others = 0, others = 0, outside = 0;
+  for (int n = 0; n < 10000; ++n) {
+    const auto kind = static_cast<std::uint64_t>(n % kPartners);
+    const SolidShape a = round_solid(&random), b = partner(kind, &random);
+    const Transform pose_a = make_transform(random_tilt(&random), {100, -20, 3});
+    const Vec3 offset = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+    const Transform pose_b = make_transform(random_tilt(&random), pose_a.origin + offset);
+    SCOPED_TRACE(std::to_string(n) + ", kind " + std::to_string(kind));
+    const SupportSolid of_a(a, pose_a), of_b(b, pose_b);
+    const double largest = test::largest_separation(of_a, of_b, &random);
+    constexpr Real kMargin = 0.1_r;
+    const detail::PairManifold found =
+        contact_between(a, pose_a, b, pose_b, {{}, kMargin, kMaxReal, {}, {}});
+    const double noise = 3e-4;
+    if (largest > 0.1 + noise) {
+      ASSERT_EQ(found.point_count, 0u) << largest;
+      ++clear[kind];
+      continue;
+    }
+    if (largest > 0.1 - 1e-3) continue;
+    ASSERT_GT(found.point_count, 0u) << largest;
+    ASSERT_NEAR(static_cast<double>(length(found.normal)), 1, 1e-5);
+    ++(largest > 0 ? near : touching)[kind];
+    // Along the normal, the solids are as far apart as the deepest point says, and this is at least
+    // the separation of the oracle. A face is preferred to another axis if it is 2 % deeper. Deep
+    // in each other, solids may have another axis than that of least overlap.
+    const double along = test::separation_along(of_a, of_b, to_point(found.normal));
+    Real deepest = found.points[0].distance;
+    for (std::uint32_t k = 1; k < found.point_count; ++k) {
+      deepest = std::min(deepest, found.points[k].distance);
+    }
+    const double difference = largest - along;
+    EXPECT_GE(static_cast<double>(deepest), along - noise);
+    const bool is_other = difference > 0.02 * std::abs(along) + noise;
+    (largest > -0.1 ? shallow_others : others) += is_other ? 1 : 0;
+    if (largest > -0.1) {
+      EXPECT_LE(difference, 0.08) << largest;
+    }
+    outside += static_cast<double>(deepest) > along + 0.02 + 0.05 * std::abs(along) ? 1 : 0;
+  }
+  EXPECT_LE(shallow_others, 5);
+  EXPECT_LT(others, 60);
+  EXPECT_LT(outside, 30);
+  for (int kind = 0; kind < kPartners; ++kind) {
+    EXPECT_GT(touching[kind], 200) << kind;
+    EXPECT_GT(near[kind], 50) << kind;
+    EXPECT_GT(clear[kind], 50) << kind;
+  }
+}
+
+/// Each point is in the middle of the overlap: within half the depth of both solids, seen along
+/// many directions.
+TEST(RoundContact, PointsAreInTheOverlap) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int points = 0;
+  for (int n = 0; n < 3000; ++n) {
+    const auto kind = static_cast<std::uint64_t>(n % kPartners);
+    const SolidShape a = round_solid(&random), b = partner(kind, &random);
+    const Transform pose_a = make_transform(random_tilt(&random), {});
+    const Transform pose_b =
+        make_transform(random_tilt(&random), random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    const SupportSolid of_a(a, pose_a), of_b(b, pose_b);
+    const detail::PairManifold found = contact_between(a, pose_a, b, pose_b);
+    for (std::uint32_t k = 0; k < found.touch_count; ++k) {
+      const Point p = to_point(found.touches[k].point);
+      const double depth = -static_cast<double>(found.touches[k].distance);
+      if (depth > 0.1) continue;
+      for (int i = 0; i < 200; ++i) {
+        const Point d = to_point(test::random_direction(&random));
+        // A point of two nearly parallel lines may be beside one of them.
+        EXPECT_LT(test::dot(p, d) - of_a.reach(d), 0.52 * depth + 0.05) << n << ' ' << kind;
+        EXPECT_LT(test::dot(p, d) - of_b.reach(d), 0.52 * depth + 0.05) << n << ' ' << kind;
+      }
+      ++points;
+    }
+  }
+  EXPECT_GT(points, 300);
+}
+
+TEST(RoundContact, HasTheDepthOfAHalfSpace) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int several = 0;
+  for (int n = 0; n < 5000; ++n) {
+    const SolidShape solid = round_solid(&random);
+    const Transform pose = make_transform(random_tilt(&random), {3, 4, 5});
+    const bool is_upright = random.below(2) == 0;
+    const Vec3 normal = is_upright ? Vec3{0, 1, 0} : test::random_direction(&random);
+    const HalfSpace wall{normal, dot(normal, pose.origin) + random.uniform(-1.2_r, 0.5_r)};
+    const double deepest =
+        -SupportSolid(solid, pose).reach(to_point(-normal)) - static_cast<double>(wall.offset);
+    const Manifold found = collide(solid, pose, wall);
+    if (deepest > 1e-4) {
+      EXPECT_EQ(found.count, 0) << n;
+    } else if (deepest < -1e-4) {
+      ASSERT_GT(found.count, 0) << n;
+      // The corners of a cap may be less deep than its rim by a hundredth of 2 % of the radius.
+      EXPECT_NEAR(static_cast<double>(found.distance), deepest, 3e-4) << n;
+      EXPECT_EQ(found.normal, normal);
+      several += found.count > 1 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(several, 300);
+}
+
+/// A triangle without neighbors has every normal, as a thin hull of its corners.
+TEST(RoundContact, WithATriangleHasTheSeparationOfTheOracle) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int touching = 0, separated = 0, missed = 0, others = 0;
+  for (int n = 0; n < 4000; ++n) {
+    const SolidShape solid = round_solid(&random);
+    const Transform pose = make_transform(random_tilt(&random), {});
+    std::vector<Vec3> corners;
+    const Vec3 centre = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+    for (int k = 0; k < 3; ++k) {
+      corners.push_back(centre + random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    }
+    const Vec3 across = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    if (!(length(across) > 0.1_r)) continue;
+    const TriangleMesh mesh(corners, {{0, 1, 2}}, true);
+    const test::SupportSolid of_solid(solid, pose);
+    const test::SupportSolid of_triangle(corners);
+    const double largest = test::largest_separation(of_solid, of_triangle, &random);
+    constexpr Real kMargin = 0.1_r;
+    detail::PairManifold found;
+    const detail::MeshView view = detail::view_of(mesh);
+    const auto find = [&](const auto& s) {
+      detail::TriangleInstance triangle;
+      ASSERT_TRUE(make_instance(view, 0, {}, pose.origin, &triangle));
+      find_contact(detail::instance(s, pose), triangle, {{}, kMargin, kMaxReal, {}, {}}, &found);
+    };
+    std::visit(find, solid);
+    const double noise = 4e-4;
+    if (largest > 0.1 + noise) {
+      EXPECT_EQ(found.point_count, 0u) << n << ", " << largest;
+      ++separated;
+      continue;
+    }
+    if (largest > 0.1 - 1e-3) continue;
+    // A solid that is deep in a triangle is pushed to the side of its centre. An axis within a
+    // degree of the normal of the triangle is left to its neighbors, which this triangle does not
+    // have.
+    if (found.point_count == 0) {
+      (largest > 0 ? missed : others) += 1;
+      continue;
+    }
+    ++touching;
+    const double along = test::separation_along(of_solid, of_triangle, to_point(found.normal));
+    const bool is_other = largest - along > 0.02 * std::abs(along) + noise;
+    (largest > 0 ? missed : others) += is_other ? 1 : 0;
+  }
+  EXPECT_LT(missed, touching / 50);
+  EXPECT_GT(touching, 400);
+  EXPECT_GT(separated, 400);
+  EXPECT_LT(others, touching / 5);
+}
+
+/// [m], distance of a point from a cylinder in its axes.
+double distance_from(const SolidShape& solid, const Point& p) {
+  const auto& cylinder = std::get<Cylinder>(solid);
+  const double x = std::hypot(p[0], p[2]) - static_cast<double>(cylinder.radius);
+  const double y = std::abs(p[1]) - static_cast<double>(cylinder.half_height);
+  return x > 0 && y > 0 ? std::hypot(x, y) : std::max(x, y);
+}
+
+TEST(RoundContact, RaysEnterWhereAnOracleDoes) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int hits = 0, misses = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const SolidShape solid = round_solid(&random);
+    const Transform pose = make_transform(random_tilt(&random), {10, 5, -2});
+    const Real far = random.below(4) == 0 ? 100.0_r : 2.0_r;
+    const Vec3 origin = pose.origin + test::random_direction(&random) * far;
+    const Vec3 target = pose.origin + random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+    Vec3 direction = normalized(target - origin);
+    if (random.below(4) == 0) direction = pose.basis.column(static_cast<int>(random.below(3)));
+    const auto cast = [&](const auto& s) { return detail::enter(origin, direction, s, pose); };
+    const detail::RayEntry entry = std::visit(
+        [&](const auto& s) -> detail::RayEntry {
+          if constexpr (detail::Round<std::decay_t<decltype(s)>>) return cast(s);
+          return {};
+        },
+        solid);
+    // Sphere tracing (Hart 1996): the first point at a distance of at most `margin`.
+    const auto first_within = [&](double margin) {
+      for (double t = 0; t < 200;) {
+        Point local{};
+        const Point world = test::sum(to_point(origin), test::scaled(to_point(direction), t));
+        const Point from = world - to_point(pose.origin);
+        for (int i = 0; i < 3; ++i)
+          local[static_cast<std::size_t>(i)] = test::dot(to_point(pose.basis.column(i)), from);
+        const double d = distance_from(solid, local);
+        if (d <= margin) return t;
+        t += d - margin + 1e-7;
+      }
+      return 1e9;
+    };
+    const double tolerance = 2e-4;
+    const double earliest = first_within(tolerance), latest = first_within(-tolerance);
+    if (entry.hit) {
+      ++hits;
+      EXPECT_GE(static_cast<double>(entry.distance), earliest - tolerance) << n;
+      EXPECT_LE(static_cast<double>(entry.distance), latest + tolerance) << n;
+      EXPECT_NEAR(static_cast<double>(length(entry.normal)), 1, 1e-5);
+      EXPECT_LE(dot(entry.normal, direction), 1e-3_r) << n;
+    } else {
+      ++misses;
+      EXPECT_GT(latest, 1e8) << n;
+    }
+  }
+  EXPECT_GT(hits, 3000);
+  EXPECT_GT(misses, 3000);
+}
+
+/// Volume, centre and moments from small cells.
+TEST(RoundContact, MassAndSubmergedVolumeAgreeWithSampling) {
+  const Cylinder solid{0.4_r, 0.7_r};
+  constexpr int kSide = 120;
+  const Mat3 basis = to_matrix(normalized(Quat{2, 0.3_r, -0.5_r, 0.7_r}));
+  std::vector<Vec3> cells;
+  const Vec3 half = detail::half_extents(solid, {});
+  const auto at = [](int i) { return (static_cast<Real>(i) + 0.5_r) * 2 / kSide - 1; };
+  for (int n = 0; n < kSide * kSide * kSide; ++n) {
+    const Vec3 p =
+        component_product(half, {at(n % kSide), at(n / kSide % kSide), at(n / kSide / kSide)});
+    if (distance_from(solid, to_point(p)) <= 0) cells.push_back(p);
+  }
+  const double cell = 8.0 * half.x * half.y * half.z / (kSide * kSide * kSide);
+  const double volume = cell * static_cast<double>(cells.size());
+  EXPECT_NEAR(detail::volume(solid), volume, 0.003 * volume);
+  double xx = 0, yy = 0;
+  Vec3 centre;
+  for (const Vec3& p : cells) {
+    centre += p;
+    xx += p.y * p.y + p.z * p.z;
+    yy += p.x * p.x + p.z * p.z;
+  }
+  const auto count = static_cast<double>(cells.size());
+  EXPECT_NEAR(static_cast<double>(length(centre)) / count, 0, 2e-3);
+  const Vec3 moments = detail::moments_of_inertia(solid, 3);
+  EXPECT_NEAR(moments.x, 3 * xx / count, 0.005 * moments.x);
+  EXPECT_NEAR(moments.y, 3 * yy / count, 0.005 * moments.y);
+  EXPECT_EQ(moments.z, moments.x);
+  for (const Vec3& up : {Vec3{0, 1, 0}, Vec3{1, 0, 0}, Vec3{0.3_r, 0.8_r, -0.5_r}}) {
+    const Vec3 normal = normalized(up);
+    for (const Real offset : {-2.0_r, -0.6_r, -0.3_r, 0.0_r, 0.1_r, 0.5_r, 2.0_r}) {
+      const detail::Submerged below = detail::submerged(solid, basis, {normal, offset});
+      double cells_below = 0;
+      Vec3 sum;
+      for (const Vec3& p : cells) {
+        const Vec3 world = basis * p;
+        if (dot(normal, world) > offset) continue;
+        ++cells_below;
+        sum += world;
+      }
+      EXPECT_NEAR(below.volume, cells_below * cell, 0.01 * volume) << offset;
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(below.moment[k], sum[k] * cell, 0.01 * volume) << offset;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace jfpx
