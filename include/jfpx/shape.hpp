@@ -40,6 +40,14 @@ struct Cylinder {
   friend bool operator==(const Cylinder&, const Cylinder&) = default;
 };
 
+/// A solid cone about the y axis of its body, whose origin is the centre of mass: the base is at
+/// y = -half_height / 2, and the apex at y = 3/2 half_height.
+struct Cone {
+  Real radius = Real(0.5);       ///< [m], > 0, of the base
+  Real half_height = Real(0.5);  ///< [m], > 0, half the distance of apex and base
+  friend bool operator==(const Cone&, const Cone&) = default;
+};
+
 /// A solid half-space: all points p with dot(normal, p) <= offset, in world coordinates. It ignores
 /// the pose of its body.
 struct HalfSpace {
@@ -58,7 +66,7 @@ struct Plane {
 };
 
 /// The shapes that have a volume, and that can be parts of compounds.
-using SolidShape = std::variant<Sphere, Box, Capsule, Hull, Cylinder>;
+using SolidShape = std::variant<Sphere, Box, Capsule, Hull, Cylinder, Cone>;
 
 /// A solid of a compound, with its pose in the axes of the body.
 struct CompoundPart {
@@ -83,7 +91,7 @@ struct Compound {
 JFPX_API Compound centred(Compound compound);
 
 using Shape = std::variant<Sphere, Box, HalfSpace, Plane, Compound, Capsule, TriangleMesh, Hull,
-                           Heightfield, Cylinder>;
+                           Heightfield, Cylinder, Cone>;
 
 /// A sphere in world coordinates, the input of SphereCollider. The layout is that of four Reals.
 struct alignas(4 * sizeof(Real)) SphereInstance {

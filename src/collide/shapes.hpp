@@ -3,6 +3,7 @@
 
 #include "src/collide/shapes/box.hpp"
 #include "src/collide/shapes/capsule.hpp"
+#include "src/collide/shapes/cone.hpp"
 #include "src/collide/shapes/cylinder.hpp"
 #include "src/collide/shapes/hull.hpp"
 #include "src/collide/shapes/plane.hpp"

@@ -16,7 +16,8 @@ template <class S>
 inline constexpr const char* kShapeName = nullptr;
 
 /// Dimensions of a solid. The core is a point, a segment along the y axis or a box; the solid
-/// consists of all points within `radius` of the core. A hull or a cylinder is inside its core.
+/// consists of all points within `radius` of the core. A hull, a cylinder or a cone is inside its
+/// core.
 struct Solid {
   Vec3 half_extents;               ///< [m], of the core
   Real radius = 0;                 ///< [m]

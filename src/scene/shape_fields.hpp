@@ -30,6 +30,11 @@ void each_field(Is<Cylinder> auto& cylinder, const auto& visit) {
   visit(required_field("radius", kSize), radius);
   visit(required_field("half_height", kSize), half_height);
 }
+void each_field(Is<Cone> auto& cone, const auto& visit) {
+  auto& [radius, half_height] = cone;
+  visit(required_field("radius", kSize), radius);
+  visit(required_field("half_height", kSize), half_height);
+}
 void each_field(Is<HalfSpace> auto& half_space, const auto& visit) {
   auto& [normal, offset] = half_space;
   visit(required_field("normal", kUnitVector), normal);

@@ -234,7 +234,7 @@ TEST(SceneWorld, ABallFallsThroughAHeightfieldOfHoles) {
   EXPECT_LT(world.states()[0].position.y, -1);
 }
 
-/// A standing and a lying cylinder come to rest where they do in the native world.
+/// Cylinders and cones, standing and lying, come to rest where they do in the native world.
 TEST(SceneWorld, RoundSolidsRestWhereTheNativeWorldHasThem) {
   Scene scene;
   BodyDef ground;
@@ -250,6 +250,7 @@ TEST(SceneWorld, RoundSolidsRestWhereTheNativeWorldHasThem) {
   };
   add(Cylinder{Real(0.4), Real(0.6)}, {-2, Real(0.62), 0}, {});
   add(Cylinder{Real(0.4), Real(0.6)}, {2, Real(0.42), 0}, normalized(Quat{1, 1, 0, 0}));
+  add(Cone{Real(0.4), Real(0.6)}, {0, Real(0.32), 2}, {});
   SceneWorld world(scene);
   World native(scene);
   for (int i = 0; i < 240; ++i) {

@@ -67,6 +67,7 @@ TEST(CoreSweep, FindsTheFirstTouchOfEveryShape) {
     expect_first_touch(core, Box{random.uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {1, 1, 1})});
     expect_first_touch(core, Capsule{random.uniform(0.1_r, 1), random.uniform(0.1_r, 1)});
     expect_first_touch(core, Cylinder{random.uniform(0.1_r, 1), random.uniform(0.1_r, 1)});
+    expect_first_touch(core, Cone{random.uniform(0.1_r, 1), random.uniform(0.1_r, 1)});
     const Hull hull = test::random_hull(&random);
     expect_first_touch(core, detail::instance(hull, {}).shape);
     expect_first_touch_of_a_triangle(&random, core);

@@ -65,6 +65,10 @@ class SupportSolid {
   static double reach_of(const Cylinder& s, const Point& d) {
     return wide(s.half_height) * std::abs(d[1]) + wide(s.radius) * std::hypot(d[0], d[2]);
   }
+  static double reach_of(const Cone& s, const Point& d) {
+    const double h = wide(s.half_height);
+    return std::max(1.5 * h * d[1], wide(s.radius) * std::hypot(d[0], d[2]) - 0.5 * h * d[1]);
+  }
 
   SolidShape shape_;
   Point origin_{}, axes_[3];

@@ -26,6 +26,7 @@ endfunction()
 
 set(thesis support/thesis.cpp) # enables Solver::worst_first
 jfpx_add_fuzzer(Scene SOURCES ${thesis} LINK jfpx_thesis)
+jfpx_add_fuzzer(Pair)
 jfpx_add_fuzzer(Recording)
 jfpx_add_fuzzer(Snapshot SOURCES fuzz/world_input.cpp ${thesis} LINK jfpx_thesis)
 jfpx_add_fuzzer(World SOURCES fuzz/world_input.cpp ${thesis} LINK jfpx_thesis)

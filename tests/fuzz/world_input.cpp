@@ -37,6 +37,11 @@ Cylinder draw_cylinder(Bytes& bytes) {
   return {radius, bytes.number(Real(0.01), 1)};
 }
 
+Cone draw_cone(Bytes& bytes) {
+  const Real radius = bytes.number(Real(0.01), 1);
+  return {radius, bytes.number(Real(0.01), 1)};
+}
+
 Compound draw_compound(Bytes& bytes) {
   Compound compound;
   for (std::uint64_t n = bytes.below(4); n > 0; --n) {
@@ -45,6 +50,8 @@ Compound draw_compound(Bytes& bytes) {
       part.shape = draw_sphere(bytes);
     } else if (bytes.chance(Real(0.7))) {
       part.shape = draw_box(bytes);
+    } else if (bytes.chance(Real(0.5))) {
+      part.shape = draw_cone(bytes);
     } else {
       part.shape = draw_cylinder(bytes);
     }
@@ -95,7 +102,7 @@ Heightfield draw_heightfield(Bytes& bytes) {
 }
 
 Shape draw_shape(Bytes& bytes) {
-  switch (bytes.below(14)) {
+  switch (bytes.below(15)) {
     case 0:
     case 1:
       return draw_box(bytes);
@@ -128,6 +135,8 @@ Shape draw_shape(Bytes& bytes) {
       }
     case 13:
       return draw_cylinder(bytes);
+    case 14:
+      return draw_cone(bytes);
     default:
       return draw_sphere(bytes);
   }

@@ -392,7 +392,7 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
               HasSubstr("body 0: has no field \"shape\""));
   EXPECT_THAT(complaint(R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "torus"}}]})"),
               HasSubstr("\"torus\"; it must be sphere, box, half_space, plane, compound, capsule, "
-                        "triangle_mesh, hull, heightfield or cylinder"));
+                        "triangle_mesh, hull, heightfield, cylinder or cone"));
   const auto with_parts = [](const std::string& parts) {
     return R"({"jfpx_scene": 1, "bodies": [{"shape": {"type": "compound", "parts": )" + parts +
            "}}]}";
@@ -401,7 +401,7 @@ TEST(SceneJson, ErrorsNameBodyFieldValueAndRange) {
   EXPECT_THAT(complaint(with_parts("[]")), HasSubstr("body 0: parts is empty"));
   EXPECT_THAT(complaint(with_parts(R"([{"shape": {"type": "plane"}}])")),
               HasSubstr("body 0.shape.parts[0].shape.type: is \"plane\"; it must be sphere, box, "
-                        "capsule, hull or cylinder"));
+                        "capsule, hull, cylinder or cone"));
   EXPECT_THAT(complaint(with_parts(R"([{"shape": {"type": "sphere", "radius": -1}}])")),
               HasSubstr("body 0: parts[0].radius is -1; it must be > 0"));
   EXPECT_THAT(complaint(with_body("\"can_sleep\": 1")), HasSubstr("must be a boolean"));

@@ -1,4 +1,4 @@
-/// Cylinders in worlds: they roll, stand, stack and slide as rigid bodies do.
+/// Cylinders and cones in worlds: they roll, stand, stack and slide as rigid bodies do.
 #include <jfpx/error.hpp>
 
 #include "tests/world/sliders.hpp"
@@ -189,13 +189,85 @@ TEST(CylinderWorld, ACoinRollsOnItsRim) {
   EXPECT_NEAR(state.position.y, 0.5, 2e-3);
 }
 
+BodyDef cone_at(const Vec3& position, const Quat& orientation, Real radius, Real half_height) {
+  BodyDef def = cylinder_at(position, orientation, 1, 1);
+  def.shape = Cone{radius, half_height};
+  return def;
+}
+
+TEST(ConeWorld, StandsAndLiesAtRestOnEveryFloor) {
+  // Half the angle at the apex has the tangent 0.3 / 0.8. The side lies on the floor.
+  const Real radius = 0.3_r, half_height = 0.4_r;
+  const Real half_angle = std::atan(radius / (2 * half_height));
+  const Real right = std::acos(-1.0_r) / 2;
+  const Quat lying = from_axis_angle({0, 0, 1}, right + half_angle);
+  const Real height = 1.5_r * half_height * std::sin(half_angle);
+  for (const Floor& floor : floors()) {
+    SCOPED_TRACE(floor.name);
+    Scene scene;
+    scene.bodies = {floor_body(floor), cone_at({0.1_r, 0.22_r, 0.2_r}, {}, radius, half_height),
+                    cone_at({2.1_r, 0.3_r, 0.2_r}, lying, radius, half_height),
+                    cone_at({-2.1_r, 0.25_r, 0.2_r}, normalized(Quat{1, 0.03_r, 0, 0.02_r}), radius,
+                            half_height)};
+    scene.bodies[2].rolling_friction = 0.005_r;
+    const World world = after_seconds(scene, 5);
+    for (std::size_t i = 1; i < 4; ++i) {
+      const BodyId body = world.bodies()[i];
+      const BodyState state = world.state(body);
+      const Real up = to_matrix(state.orientation).column(1).y;
+      EXPECT_FALSE(world.awake(body)) << i;
+      if (i == 2) {
+        EXPECT_NEAR(up, -std::sin(half_angle), 0.01);
+        EXPECT_NEAR(state.position.y, height, 2e-3);
+      } else {
+        EXPECT_NEAR(state.position.y, half_height / 2, 2e-3) << i;
+        EXPECT_NEAR(up, 1, 1e-3) << i;
+      }
+    }
+  }
+}
+
+/// A lying cone rolls about its apex, which stays where it is.
+TEST(ConeWorld, RollsInACircleAboutItsApex) {
+  const Real radius = 0.3_r, half_height = 0.4_r;
+  const Real half_angle = std::atan(radius / (2 * half_height));
+  const Real right = std::acos(-1.0_r) / 2;
+  const Quat lying = from_axis_angle({0, 0, 1}, right + half_angle);
+  Scene scene;
+  BodyDef plane = test::half_space({0, 1, 0}, 0);
+  plane.friction = 1;
+  const Real height = 1.5_r * half_height * std::sin(half_angle);
+  BodyDef cone = cone_at({0, height, 0}, lying, radius, half_height);
+  cone.friction = 1;
+  cone.can_sleep = false;
+  // The line of contact is the momentary axis.
+  const Vec3 apex = Vec3{0, height, 0} + rotate(lying, {0, 1.5_r * half_height, 0});
+  const Vec3 spin{-1.5_r, 0, 0};
+  cone.angular_velocity = spin;
+  cone.velocity = cross(spin, Vec3{0, height, 0} - apex);
+  scene.bodies = {plane, cone};
+  World world(scene);
+  Real farthest = 0, turned = 0;
+  for (int n = 0; n < 300; ++n) {
+    world.step();
+    const BodyState state = world.state(world.bodies()[1]);
+    const Vec3 now = state.position + rotate(state.orientation, {0, 1.5_r * half_height, 0});
+    farthest = std::max(farthest, length(now - apex));
+    turned = std::max(turned, absolute(state.position.z));
+  }
+  EXPECT_LT(farthest, 0.03_r);
+  EXPECT_GT(turned, 0.3_r);
+}
+
 TEST(CylinderWorld, JsonPreservesCylindersAndNamesTheirFaults) {
   Scene scene;
   scene.bodies = {cylinder_at({1, 2, 3}, kAlongZ, 0.25_r, 0.75_r)};
   CompoundPart part;
   part.shape = Cylinder{0.1_r, 0.2_r};
+  CompoundPart other = part;
+  other.shape = Cone{0.1_r, 0.2_r};
   BodyDef compound;
-  compound.shape = Compound{{part}};
+  compound.shape = Compound{{part, other}};
   scene.bodies.push_back(compound);
   EXPECT_EQ(from_json(to_json(scene)), scene);
   for (const bool is_radius : {true, false}) {

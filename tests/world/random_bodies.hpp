@@ -36,7 +36,8 @@ inline Hull random_hull(Random* random) {
 }
 
 inline SolidShape random_sub_shape(Random* random) {
-  const std::uint64_t kind = random->below(7);
+  const std::uint64_t kind = random->below(8);
+  if (kind == 7) return Cone{random->uniform(0.1_r, 0.5_r), random->uniform(0.1_r, 0.6_r)};
   if (kind == 6) return Cylinder{random->uniform(0.1_r, 0.5_r), random->uniform(0.1_r, 0.6_r)};
   if (kind == 5) return random_hull(random);
   if (kind < 2) return Sphere{random->uniform(0.1_r, 0.6_r)};

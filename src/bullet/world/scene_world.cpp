@@ -15,9 +15,10 @@
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <BulletCollision/CollisionShapes/btConeShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
-#include <BulletCollision/CollisionShapes/btEmptyShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
+#include <BulletCollision/CollisionShapes/btEmptyShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
@@ -143,6 +144,18 @@ class ShapeStore {
     }
     shape->setMargin(hull.data().view.least_half_width * btScalar(0.01));
     shape->recalcLocalAabb();
+    shapes_.push_back(std::move(shape));
+    return shapes_.back().get();
+  }
+  /// Bullet's cone has its origin in the middle of the height, not in the centre of mass.
+  btCollisionShape* make(const Cone& cone, const btTransform&) {
+    auto child = std::make_unique<btConeShape>(cone.radius, 2 * cone.half_height);
+    child->setMargin(detail::least_half_width(cone) * btScalar(0.01));
+    auto shape = std::make_unique<btCompoundShape>();
+    shape->addChildShape(
+        btTransform(btQuaternion::getIdentity(), btVector3(0, cone.half_height / 2, 0)),
+        child.get());
+    shapes_.push_back(std::move(child));
     shapes_.push_back(std::move(shape));
     return shapes_.back().get();
   }

@@ -3,8 +3,7 @@
 #pragma once
 
 #include "src/collide/pair_manifold.hpp"
-#include "src/collide/ray.hpp"
-#include "src/collide/submerged.hpp"
+#include "src/collide/shapes/box.hpp"
 
 #include <concepts>
 
@@ -51,9 +50,11 @@ JFPX_HD inline Frustum make_frustum(Real lower, Real upper, Real lower_radius, R
   const Real height = upper - lower, taper = lower_radius - upper_radius;
   Frustum result{lower, upper, lower_radius, upper_radius};
   if (taper == 0) return result;
-  const Real scale = Real(1) / square_root(height * height + taper * taper);
-  result.side_cosine = height * scale;
-  result.side_sine = taper * scale;
+  // Squares of tiny lengths would underflow.
+  const Real size = height < taper ? taper : height, across = taper / size, along = height / size;
+  const Real scale = Real(1) / square_root(along * along + across * across);
+  result.side_cosine = along * scale;
+  result.side_sine = across * scale;
   return result;
 }
 
@@ -217,6 +218,10 @@ JFPX_HD inline Frustum to_frustum(const Cylinder& cylinder) {
   return {-cylinder.half_height, cylinder.half_height, cylinder.radius, cylinder.radius};
 }
 
+JFPX_HD inline Frustum to_frustum(const Cone& cone) {
+  return make_frustum(cone.half_height * Real(-0.5), cone.half_height * Real(1.5), cone.radius, 0);
+}
+
 /// The solids of revolution with flat ends.
 template <class S>
 concept Round = requires(const S& solid) {
@@ -249,7 +254,9 @@ Real outer_radius(const S& solid) {
 }
 template <Round S>
 Real bounding_radius(const S& solid) {
-  return outer_radius(solid) * (1 + 64 * kEpsilon);
+  const Frustum frustum = to_frustum(solid);
+  const Real up = frustum.upper, down = -frustum.lower;
+  return bounding_radius(Box{{frustum.lower_radius, up < down ? down : up, 0}});
 }
 
 }  // namespace detail

@@ -37,7 +37,8 @@ JFPX_HD inline Vec3 cap_corner(const Frustum& frustum, int cap, int k) {
 
 /// A line on the surface of a solid, or a point if both ends are equal.
 struct SupportingLine {
-  Vec3 from, to;  ///< [m]
+  Vec3 from, to;         ///< [m]
+  bool is_disc = false;  ///< the point is the middle of a cap that is hardly tilted
 
   JFPX_HD bool is_point() const { return from == to; }
 };
@@ -51,8 +52,11 @@ JFPX_HD inline SupportingLine supporting_line(const Frustum& f, const Vec3& dire
   const Radial radial = radial_of(direction);
   const Real slope = f.side_cosine * direction.y - f.side_sine * radial.distance;
   if (!(absolute(slope) <= kLineSine)) {
-    const Vec3 p = support_point(f, direction);
-    return {p, p};
+    const bool is_upper = f.is_upper_farthest(radial.distance, direction.y);
+    const bool is_disc =
+        radial.distance <= kLineSine && (is_upper ? f.upper_radius : f.lower_radius) > 0;
+    const Vec3 p = f.rim_point(is_upper, is_disc ? Vec3{} : radial.direction);
+    return {p, p, is_disc};
   }
   return {f.rim_point(false, radial.direction), f.rim_point(true, radial.direction)};
 }
@@ -263,6 +267,13 @@ JFPX_HD inline Segment segment_between(const Vec3& from, const Vec3& to) {
   return {(from + to) * Real(0.5), along * (Real(1) / size), size * Real(0.5)};
 }
 
+/// The point of a line that is closest to another point.
+JFPX_HD inline Vec3 closest_of_line(const SupportingLine& line, const Vec3& p) {
+  if (line.is_point()) return line.from;
+  const Segment segment = segment_between(line.from, line.to);
+  return segment.point(segment.closest(p));
+}
+
 /// The points of an axis that is not the normal of a face: where two lines are closest, or two
 /// points on lines that are nearly parallel.
 /// @param normal   unit, from b to a, in the axes of a
@@ -275,6 +286,16 @@ JFPX_HD void visit_line_pair(const ConvexPair<A, B>& pair, const Vec3& normal, R
   const SupportingLine local = supporting_line(pair.b, transform_transpose(pair.rotation, normal));
   const SupportingLine b{pair.place(local.from), pair.place(local.to)};
   const auto add_single = [&](const Vec3& on_a) { add(on_a, distance, kRimPoint); };
+  // Where a cap is hardly tilted, the direction of its deepest point is noise.
+  if (a.is_disc && local.is_disc) {
+    const Vec3 across = b.from - a.from;
+    return add_single(
+        add_scaled(a.from, add_scaled(across, normal, -dot(normal, across)), Real(0.5)));
+  }
+  if (a.is_disc) {
+    return add_single(add_scaled(closest_of_line(b, a.from), normal, distance));
+  }
+  if (local.is_disc) return add_single(closest_of_line(a, b.from));
   if (a.is_point()) return add_single(a.from);
   if (local.is_point()) return add_single(add_scaled(b.from, normal, distance));
   const Vec3 along_a = a.to - a.from, along_b = b.to - b.from, common = cross(along_a, along_b);
