@@ -105,6 +105,22 @@ TEST(RoundContact, HasTheSeparationOfTheOracleWithEverySolid) {
   }
 }
 
+/// Long solids with the same axis overlap least across it, in any direction.
+TEST(RoundContact, SolidsWithTheSameAxisAreParted) {
+  const Transform pose = make_transform(normalized(Quat{1, 0.4_r, -0.3_r, 0.2_r}), {1, 2, 3});
+  const SolidShape solids[] = {Cylinder{0.1_r, 0.8_r}, Cone{0.1_r, 0.8_r}, Capsule{0.1_r, 0.8_r}};
+  for (const SolidShape& a : solids) {
+    for (const SolidShape& b : {solids[0], solids[1]}) {
+      const detail::PairManifold found = contact_between(a, pose, b, pose);
+      ASSERT_GT(found.point_count, 0u);
+      EXPECT_LT(absolute(dot(found.normal, pose.basis.column(1))), 0.1_r);
+      for (std::uint32_t k = 0; k < found.point_count; ++k) {
+        EXPECT_GT(found.points[k].distance, -0.205_r);
+      }
+    }
+  }
+}
+
 /// Each point is in the middle of the overlap: within half the depth of both solids, seen along
 /// many directions.
 TEST(RoundContact, PointsAreInTheOverlap) {

@@ -250,7 +250,10 @@ JFPX_HD bool find_axes(const ConvexPair<A, B>& pair, Real radii, Real limit, Con
     const Vec3 first = line(pair.a, i);
     const Vec3 across = add_scaled(between, first, -dot(first, between));
     const Real distance = length(across);
-    if (distance > kEpsilon * pair.size) consider(0, across * (Real(1) / distance), &lines);
+    // All directions across a common axis, which is the y axis, are alike.
+    const bool is_apart = distance > kEpsilon * pair.size;
+    consider(0, is_apart ? across * (Real(1) / distance) : Vec3{1, 0, 0}, &lines);
+    if (is_far) return false;
     for (int k = 0; k < line_count(pair.b); ++k) {
       const Vec3 axis = cross(first, pair.rotation * line(pair.b, k));
       const Real sine = length(axis);
