@@ -233,6 +233,21 @@ TEST(RoundContact, WithATriangleHasTheSeparationOfTheOracle) {
   EXPECT_LT(others, touching / 5);
 }
 
+/// A gap of 0.27 m, along an axis that is far from all axes of the faces and edges.
+TEST(RoundContact, AConeBesideATriangleDoesNotTouchIt) {
+  const Transform pose{};
+  const TriangleMesh mesh({{1.3345_r, 0.3003_r, 1.5565_r},
+                           {1.4468_r, -0.9281_r, 1.8119_r},
+                           {0.2481_r, 0.4379_r, 0.3074_r}},
+                          {{0, 1, 2}}, true);
+  const detail::MeshView view = detail::view_of(mesh);
+  detail::TriangleInstance triangle;
+  ASSERT_TRUE(make_instance(view, 0, {}, {}, &triangle));
+  detail::PairManifold found;
+  find_contact(detail::instance(Cone{0.7281_r, 0.25126_r}, pose), triangle, {}, &found);
+  EXPECT_EQ(found.point_count, 0u);
+}
+
 /// [m], distance of a point from a cylinder or a cone in its axes, from the sides of its profile.
 double distance_from(const SolidShape& solid, const Point& p) {
   double corners[4][2] = {};  // distance from the axis, and height

@@ -8,6 +8,9 @@
 /// because the closest points have the largest separation of all axes, and the translation adds to
 /// the first axis at least as much as to any other one. Overlapping solids thus need no algorithm
 /// of their own. The closest points are those of Gilbert, Johnson and Keerthi (1988).
+///
+/// Nearly all of the time goes into the farthest points. Hence an axis is found up to a tolerance,
+/// the few axes that might become the best get two rounds each, and only the best one gets more.
 #pragma once
 
 #include "src/collide/polyhedron.hpp"
@@ -100,6 +103,8 @@ struct ConvexPair {
   /// @param n unit, from b to a
   JFPX_HD Real separation(const Vec3& n) const { return dot(n, lowest_difference(n)); }
   JFPX_HD Real error() const { return 8 * kEpsilon * size; }
+  /// [m], by which a separation may be less than the largest one near it.
+  JFPX_HD Real tolerance() const { return Real(1e-4) * size; }
   /// [m], of solids whose closest points have an accurate direction.
   JFPX_HD Real clear_gap() const { return size * (Real(1) / 128); }
 };
@@ -117,8 +122,8 @@ struct Simplex {
     }
     return false;
   }
-  /// Adds a point and removes those without which the closest point is the same. The origin is
-  /// outside, so that the closest point is on a triangle with the newest point.
+  /// Adds a point and removes those without which the closest point is the same. If the origin is
+  /// outside, the closest point is on a triangle with the newest point; if not, it is the origin.
   JFPX_HD void add(const Vec3& p) {
     point[count++] = p;
     if (count < 3) {
@@ -129,15 +134,28 @@ struct Simplex {
       const Vec3 q[3] = {point[0], point[1], point[2]};
       Simplex best;
       for (int i = 0; i < 3; ++i) {
+        const Vec3 &b = q[i], &c = q[i == 2 ? 0 : i + 1], &inner = q[i == 0 ? 2 : i - 1];
+        if (is_hidden(p, b, c, inner)) continue;
         Simplex part;
-        part.set_of_triangle(p, q[i], q[i == 2 ? 0 : i + 1]);
-        if (i == 0 || length_squared(part.closest) < length_squared(best.closest)) best = part;
+        part.set_of_triangle(p, b, c);
+        if (best.count == 0 || length_squared(part.closest) < length_squared(best.closest)) {
+          best = part;
+        }
       }
       *this = best;
     }
   }
 
  private:
+  /// Whether the origin is on the side of `inner` of the triangle. False in flat or thin
+  /// tetrahedra, in which the side is noise.
+  JFPX_HD static bool is_hidden(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& inner) {
+    constexpr Real kLeastVolume = Real(0.01);
+    const Vec3 ab = b - a, ac = c - a, up = inner - a, n = cross(ab, ac);
+    const Real volume = dot(n, up);
+    const Real sizes2 = length_squared(ab) * length_squared(ac) * length_squared(up);
+    return volume * volume > kLeastVolume * kLeastVolume * sizes2 && volume * -dot(n, a) > 0;
+  }
   JFPX_HD void set(const Vec3& a) {
     count = 1;
     point[0] = closest = a;
@@ -172,8 +190,8 @@ struct Simplex {
   }
 };
 
-/// The axis of the largest separation of two solids, of which a is translated by `shift`. They must
-/// be separated along the unit vector `start`.
+/// The axis of the largest separation of two solids, of which a is translated by `shift`, if they
+/// are separated. Otherwise an axis that is at least as good as the unit vector `start`.
 template <class Pair>
 JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3& start) {
   constexpr int kMost = 32;
@@ -184,7 +202,7 @@ JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3
     const Vec3 lowest = pair.lowest_difference(n) + shift;
     const Real separation = dot(n, lowest);
     if (i == 0 || separation > widest) widest = separation, best = n;
-    if (distance - widest <= pair.error() || simplex.contains(lowest)) break;
+    if (distance - widest <= pair.tolerance() || simplex.contains(lowest)) break;
     simplex.add(lowest);
     const Real closest = length(simplex.closest);
     if (!(closest < distance) || !(closest > 0)) break;
@@ -198,21 +216,31 @@ JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3
 /// @param normal     unit, from b to a
 /// @param separation [m], of the axis
 /// @param limit      [m]; ends as soon as the separation is larger
+/// @param most       number of rounds
 template <class Pair>
-JFPX_HD void improve(const Pair& pair, Real limit, Vec3* normal, Real* separation) {
-  constexpr int kMost = 6;
+JFPX_HD void improve(const Pair& pair, Real limit, int most, Vec3* normal, Real* separation) {
   const Real clear = pair.clear_gap();
-  for (int i = 0; i < kMost; ++i) {
+  for (int i = 0; i < most; ++i) {
     const bool is_clear = *separation > clear;
     const Real shift = is_clear ? Real(0) : clear - *separation;
     const Vec3 n = widest_of_separated(pair, *normal * shift, *normal);
     const Real next = pair.separation(n);
     if (!(next > *separation)) return;
-    const bool is_last = next - *separation < pair.error();
+    const bool is_last = next - *separation < pair.tolerance();
     *normal = n;
     *separation = next;
     if (is_clear || is_last || next > limit) return;
   }
+}
+
+/// Replaces an axis of overlap by one that separates the solids, if there is one. It may be far
+/// from the axis if a solid is thin.
+template <class Pair>
+JFPX_HD void find_separating_axis(const Pair& pair, Vec3* normal, Real* separation) {
+  if (!(*separation < 0)) return;
+  const Vec3 n = widest_of_separated(pair, {}, *normal);
+  const Real found = pair.separation(n);
+  if (found > *separation) *normal = n, *separation = found;
 }
 
 /// The axes of a contact of two convex solids.
@@ -222,6 +250,9 @@ struct ConvexAxes {
   LeastOverlap preferred;  ///< its number is that of the face; faces precede other axes
   LeastOverlap widest;     ///< of the largest separation, or of least overlap
 };
+
+/// Rounds of improve(), for each of several axes and for the best one of them.
+inline constexpr int kFirstRounds = 2, kLastRounds = 6;
 
 /// False if an axis separates the solids by more than `limit`.
 /// @param radii [m], around both solids: not 0 for the core of a capsule
@@ -264,11 +295,13 @@ JFPX_HD bool find_axes(const ConvexPair<A, B>& pair, Real radii, Real limit, Con
       if (is_far) return false;
     }
   }
-  // Deep in each other, the axis of least overlap may be far from the best one of the others.
+  // Deep in each other, the axis of least overlap may be far from the best one of the others. It is
+  // rarely near an axis of much more overlap.
   LeastOverlap best{};
   const auto try_near = [&](LeastOverlap near, bool always) {
-    if (near.axis < 0 || !(always || best.distance < pair.clear_gap() * Real(-0.5))) return;
-    improve(pair, limit, &near.normal, &near.distance);
+    const bool is_deep = best.distance < pair.clear_gap() * Real(-0.5);
+    if (near.axis < 0 || !(always || (is_deep && near.distance > 3 * best.distance))) return;
+    improve(pair, limit, kFirstRounds, &near.normal, &near.distance);
     if (best.axis < 0 || near.distance > best.distance) best = near;
   };
   const bool is_line = !(of_b.axis >= 0 && of_b.distance > lines.distance) &&
@@ -279,6 +312,10 @@ JFPX_HD bool find_axes(const ConvexPair<A, B>& pair, Real radii, Real limit, Con
   for (const LeastOverlap* near : {&lines, &of_b, &of_a}) {
     if (near != &first) try_near(*near, false);
   }
+  if (best.distance < pair.clear_gap()) {
+    improve(pair, limit, kLastRounds, &best.normal, &best.distance);
+  }
+  find_separating_axis(pair, &best.normal, &best.distance);
   if (best.distance > limit) return false;
   axes->widest = best;
   axes->widest.axis = 0;

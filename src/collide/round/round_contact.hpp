@@ -217,7 +217,8 @@ JFPX_HD inline bool place_triangle(const Frustum& frustum, const Mat3& axes,
   if (!widest_separation(f, limit, widest)) return false;
   const Real before = widest->distance;
   LeastOverlap closest = *widest;
-  improve(f.pair, limit, &closest.normal, &closest.distance);
+  improve(f.pair, limit, kLastRounds, &closest.normal, &closest.distance);
+  find_separating_axis(f.pair, &closest.normal, &closest.distance);
   if (closest.distance > limit) return false;
   if (!(closest.distance > before + f.error())) return true;
   closest.axis = FrustumTriangle::kEdgeAxis;
