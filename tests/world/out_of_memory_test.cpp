@@ -275,7 +275,9 @@ constexpr int kChanges = 10;
 /// Changes of bodies that need no memory but for the contacts of the last step.
 /// @param number below kChanges
 void change_bodies(World& w, int number) {
-  const BodyId moved = w.bodies()[1], pushed = w.bodies()[2], gone = w.bodies()[3];
+  const BodyId moved = w.bodies()[1], gone = w.bodies()[3];
+  const BodyId pushed = *std::ranges::find_if(
+      w.bodies(), [&](BodyId id) { return w.mass(id) > 0 && !(id == moved) && !(id == gone); });
   BodyState state = w.state(moved);
   state.position.y += 1;
   switch (number) {
