@@ -95,7 +95,7 @@ TEST(RoundContact, HasTheSeparationOfTheOracleWithEverySolid) {
     (largest > -0.1 ? shallow_others : others) += is_other ? 1 : 0;
     outside += static_cast<double>(deepest) > along + 0.02 + 0.05 * std::abs(along) ? 1 : 0;
   }
-  EXPECT_LE(shallow_others, 5);
+  EXPECT_LT(shallow_others, 16);  // 2 on average
   EXPECT_LT(others, 60);
   EXPECT_LT(outside, 30);
   for (int kind = 0; kind < kPartners; ++kind) {
@@ -122,12 +122,13 @@ TEST(RoundContact, SolidsWithTheSameAxisAreParted) {
 }
 
 /// Each point is in the middle of the overlap: within half the depth of both solids, seen along
-/// many directions.
+/// many directions. A point of two nearly parallel lines may be beside one of them; one point in
+/// 10,000 is farther away.
 TEST(RoundContact, PointsAreInTheOverlap) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
-  int points = 0;
+  int points = 0, beside = 0;
   for (int n = 0; n < 3000; ++n) {
     const auto kind = static_cast<std::uint64_t>(n % kPartners);
     const SolidShape a = round_solid(&random), b = partner(kind, &random);
@@ -140,15 +141,19 @@ TEST(RoundContact, PointsAreInTheOverlap) {
       const Point p = to_point(found.touches[k].point);
       const double depth = -static_cast<double>(found.touches[k].distance);
       if (depth > 0.1) continue;
+      bool is_beside = false;
       for (int i = 0; i < 200; ++i) {
         const Point d = to_point(test::random_direction(&random));
-        // A point of two nearly parallel lines may be beside one of them.
-        EXPECT_LT(test::dot(p, d) - of_a.reach(d), 0.52 * depth + 0.05) << n << ' ' << kind;
-        EXPECT_LT(test::dot(p, d) - of_b.reach(d), 0.52 * depth + 0.05) << n << ' ' << kind;
+        const double outside =
+            test::dot(p, d) - std::min(of_a.reach(d), of_b.reach(d)) - 0.52 * depth;
+        is_beside = is_beside || outside > 0.05;
+        EXPECT_LT(outside, 0.3) << n << ' ' << kind;
       }
+      beside += is_beside ? 1 : 0;
       ++points;
     }
   }
+  EXPECT_LE(beside, 3);
   EXPECT_GT(points, 300);
 }
 

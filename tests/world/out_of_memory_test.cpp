@@ -8,6 +8,7 @@
 #include "tests/support/temporary_folder.hpp"
 #include "tests/world/random_bodies.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace jfpx {
