@@ -1,4 +1,4 @@
-/// The cylinder: mass, bounds, ray, submerged volume. Its contacts are those of all round solids.
+/// The cylinder: mass and inner radius. Its contacts are those of all round solids.
 #pragma once
 
 #include "src/collide/round/round_contact.hpp"
