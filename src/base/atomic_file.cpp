@@ -4,9 +4,11 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/file.hpp"
+#include "src/base/system.hpp"
 
 #include <cerrno>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 namespace jfpx {
@@ -17,7 +19,7 @@ namespace fs = std::filesystem;
 
 /// True if the path exists and is not a regular file, so that renaming a file to it would destroy
 /// it.
-bool is_special(const std::string& path) {
+bool is_special(const fs::path& path) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   return fs::exists(status) && !fs::is_regular_file(status);
@@ -26,39 +28,42 @@ bool is_special(const std::string& path) {
 /// Target of a chain of symbolic links, which need not exist.
 std::string follow_links(const std::string& path) {
   constexpr int kMaxLinks = 40;  // the limit of Linux; links may form a cycle
-  fs::path target = path;
+  fs::path target = to_path(path);
   std::error_code ignored;
   for (int i = 0; i < kMaxLinks && fs::is_symlink(target, ignored); ++i) {
     target = target.parent_path() / fs::read_symlink(target, ignored);
   }
-  return target.string();
+  return to_text(target);
 }
 
 }  // namespace
 
 AtomicFile::AtomicFile(std::string path)
     : path_(std::move(path)),
-      target_(is_special(path_) ? path_ : follow_links(path_)),
-      part_(is_special(target_) ? target_ : target_ + ".part"),
-      file_(std::fopen(part_.c_str(), "wb")) {
-  if (file_ == nullptr) fail();
+      target_(is_special(to_path(path_)) ? path_ : follow_links(path_)),
+      part_(is_special(to_path(target_)) ? target_ : target_ + ".part"),
+      file_(open_file(part_, "wb")) {
+  if (file_ == nullptr) fail(errno);
 }
 
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) std::fclose(file_);
-  if (!finished_ && part_ != target_) std::remove(part_.c_str());
+  std::error_code ignored;
+  if (!finished_ && part_ != target_) fs::remove(to_path(part_), ignored);
 }
 
 void AtomicFile::write(std::string_view bytes) {
   require_open();
   if (bytes.empty()) return;  // fwrite does not accept a null pointer
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail();
+  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail(errno);
 }
 
 void AtomicFile::finish() {
   require_open();
-  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail();
-  if (part_ != target_ && std::rename(part_.c_str(), target_.c_str()) != 0) fail();
+  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail(errno);
+  std::error_code error;
+  if (part_ != target_) fs::rename(to_path(part_), to_path(target_), error);
+  if (error) fail(error.default_error_condition().value());
   finished_ = true;
 }
 
@@ -68,9 +73,9 @@ void AtomicFile::require_open() const {
   }
 }
 
-void AtomicFile::fail() {
+void AtomicFile::fail(int error_number) {
   failed_ = true;
-  throw FileError(file_message(path_, "can't be written", errno));
+  throw FileError(file_message(path_, "can't be written", error_number));
 }
 
 }  // namespace JFPX_ABI

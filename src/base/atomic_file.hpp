@@ -29,7 +29,7 @@ class JFPX_API AtomicFile {
 
  private:
   void require_open() const;
-  [[noreturn]] void fail();
+  [[noreturn]] void fail(int error_number);
 
   std::string path_;
   std::string target_;  ///< path_ with symbolic links resolved

@@ -3,12 +3,13 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/system.hpp"
+
 #include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <new>
 #include <string>
-#include <sys/mman.h>
 #include <type_traits>
 #include <utility>
 
@@ -77,9 +78,8 @@ class Buffer {
       throw OutOfMemory("out of memory: " + std::to_string(bytes) + " bytes needed for " +
                         std::to_string(count) + " " + purpose);
     }
-    // Huge pages, because random access to large buffers is bound by address translation. This is
-    // a hint, so a failure is not an error.
-    if (bytes >= 2 * kHugePage) ::madvise(memory, bytes, MADV_HUGEPAGE);
+    // Random access to large buffers is bound by address translation.
+    if (bytes >= 2 * kHugePage) advise_huge_pages(memory, bytes);
     return static_cast<T*>(memory);
   }
   static void release(T* data, std::size_t capacity) noexcept {

@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/atomic_file.hpp"
+#include "src/base/system.hpp"
 
 #include <cerrno>
 #include <cstdio>
@@ -26,7 +27,7 @@ std::string file_message(const std::string& path, std::string_view what, int err
 }
 
 std::string read_file(const std::string& path) {
-  const File file(std::fopen(path.c_str(), "rb"));
+  const File file(open_file(path, "rb"));
   if (!file) throw FileError(file_message(path, "can't be opened", errno));
   std::string content;
   constexpr std::size_t kSize = std::size_t{1} << 16;  // too large for the stacks of some programs

@@ -4,6 +4,7 @@
 #include <jfpx/config.hpp>
 
 #include <cfenv>
+#include <cstdint>
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -41,7 +42,10 @@ inline bool traps_are_masked() noexcept {
 #if defined(__x86_64__)
   return (_mm_getcsr() & _MM_MASK_MASK) == _MM_MASK_MASK;
 #else
-  return fegetexcept() == 0;
+  constexpr std::uint64_t kTraps = 0x9f00;  // IDE, IXE, UFE, OFE, DZE, IOE (Arm ARM, FPCR)
+  std::uint64_t fpcr;
+  asm volatile("mrs %0, fpcr" : "=r"(fpcr));
+  return (fpcr & kTraps) == 0;
 #endif
 }
 

@@ -3,6 +3,10 @@
 
 #include <jfpx/config.hpp>
 
+#if defined(__x86_64__)
+#include <emmintrin.h>
+#endif
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 
@@ -10,7 +14,7 @@ inline namespace JFPX_ABI {
 /// no effect; `isb` flushes the pipeline, which takes about as long as x86-64's `pause`.
 inline void pause() {
 #if defined(__x86_64__)
-  __builtin_ia32_pause();
+  _mm_pause();
 #else
   asm volatile("isb" : : : "memory");
 #endif

@@ -3,12 +3,14 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/atomic_wait.hpp"
 #include "src/base/pause.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cfenv>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <exception>
 #include <mutex>
@@ -96,10 +98,10 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   void run_chunks(std::size_t first, std::uint32_t count);
   std::size_t first_chunk(unsigned owner) const;
 
-  /// Workers that pools may share. Both members are trivially destructible, because pools may be
-  /// static.
-  static constinit std::mutex list_mutex_;
+  /// Workers that pools may share.
   static constinit Workers* list_;
+  /// Of list_. It is never destroyed, because pools may be static.
+  static std::mutex& list_mutex();
   Workers* next_ = nullptr;
   std::thread::id creator_ = std::this_thread::get_id();
 
@@ -122,13 +124,18 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   std::vector<std::thread> workers_;
 };
 
-constinit std::mutex ThreadPool::Workers::list_mutex_;
 constinit ThreadPool::Workers* ThreadPool::Workers::list_ = nullptr;
+
+std::mutex& ThreadPool::Workers::list_mutex() {
+  alignas(std::mutex) static std::byte storage[sizeof(std::mutex)];
+  static std::mutex& mutex = *new (storage) std::mutex;
+  return mutex;
+}
 
 std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::shared(unsigned threads) {
   // Released after the lock, which the destructor of the workers takes.
   std::shared_ptr<Workers> of_others;
-  const std::lock_guard lock(list_mutex_);
+  const std::lock_guard lock(list_mutex());
   for (Workers* known = list_; known != nullptr; known = known->next_) {
     if (known->requested_ != threads) continue;
     const bool is_own = known->creator_ == std::this_thread::get_id();
@@ -145,7 +152,7 @@ std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::acquire_others(
     unsigned threads) noexcept {
   std::shared_ptr<Workers> found;  // released after the lock
   // In a child process, the lock may be that of a thread that does not exist there.
-  const std::unique_lock lock(list_mutex_, std::try_to_lock);
+  const std::unique_lock lock(list_mutex(), std::try_to_lock);
   if (!lock.owns_lock()) return nullptr;
   for (Workers* known = list_; known != nullptr; known = known->next_) {
     if (known->requested_ != threads || known->busy_.load(std::memory_order_relaxed)) continue;
@@ -199,7 +206,7 @@ ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
 
 ThreadPool::Workers::~Workers() {
   {
-    const std::lock_guard lock(list_mutex_);
+    const std::lock_guard lock(list_mutex());
     for (Workers** known = &list_; *known != nullptr; known = &(*known)->next_) {
       if (*known != this) continue;
       *known = next_;
@@ -208,7 +215,7 @@ ThreadPool::Workers::~Workers() {
   }
   stopped_ = true;
   ++number_;
-  number_.notify_all();
+  wake_all(number_);
   for (std::thread& worker : workers_) worker.join();
 }
 
@@ -234,7 +241,7 @@ void ThreadPool::Workers::run_job(const Job& job) {
     tickets_[owner].value.store(std::uint64_t{number} << 32 | chunks, std::memory_order_release);
   }
   number_.store(number);
-  number_.notify_all();
+  wake_all(number_);
   take_chunks(0);
   // Does not wait for workers without a chunk: on a loaded machine that would take longer than the
   // loop.
@@ -245,7 +252,7 @@ void ThreadPool::Workers::run_job(const Job& job) {
     if (i < polls_) {
       pause();
     } else {
-      done_.wait(done, std::memory_order_acquire);
+      wait_while_equal(done_, done);
     }
   }
 }
@@ -258,7 +265,7 @@ void ThreadPool::Workers::work(unsigned self) {
 /// @param seen number of the last job
 void ThreadPool::Workers::wait_for_job(std::uint32_t* seen) {
   poll(*seen);
-  number_.wait(*seen);
+  wait_while_equal(number_, *seen);
   *seen = number_.load();
 }
 
@@ -327,7 +334,7 @@ void ThreadPool::Workers::run_chunks(std::size_t first, std::uint32_t count) {
     }
   }
   // After the last chunk, the next job may begin at once and overwrite this one.
-  if (done_.fetch_add(count, std::memory_order_acq_rel) + count == chunks) done_.notify_one();
+  if (done_.fetch_add(count, std::memory_order_acq_rel) + count == chunks) wake_one(done_);
 }
 
 void ThreadPool::check(unsigned threads) {

@@ -3,10 +3,10 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/system.hpp"
 #include "src/scenes/makers.hpp"
 
 #include <cmath>
-#include <unistd.h>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -72,8 +72,7 @@ std::uint32_t boxes_of(const Entry& entry, std::uint32_t spheres,
 void require_memory(std::uint64_t bodies) {
   // Twice the size, because a world copies the bodies.
   const double needed = 2.0 * static_cast<double>(bodies) * sizeof(BodyDef);
-  const double present =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+  const auto present = static_cast<double>(physical_memory());
   if (needed <= present) return;
   constexpr double kMiB = 1024.0 * 1024.0;
   throw OutOfMemory("a scene of " + std::to_string(bodies) + " bodies needs about " +

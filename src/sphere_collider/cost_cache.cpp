@@ -3,10 +3,10 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/system.hpp"
 #include "src/sphere_collider/backend_table.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -20,15 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFileName =
     sizeof(Real) == 4 ? "cost-model-float.json" : "cost-model-double.json";
-
-/// Follows the XDG base directory specification: relative paths are ignored.
-fs::path cache_folder() {
-  const char* cache = std::getenv("XDG_CACHE_HOME");
-  if (cache != nullptr && fs::path(cache).is_absolute()) return cache;
-  const char* home = std::getenv("HOME");
-  if (home != nullptr && fs::path(home).is_absolute()) return fs::path(home) / ".cache";
-  return {};
-}
 
 std::string first_line(const fs::path& path, const std::string& beginning = {}) {
   std::ifstream file(path);
@@ -68,7 +59,7 @@ std::string problem_with(const CostModelOrigin& origin) {
 
 std::string cost_model_path() {
   const fs::path folder = cache_folder();
-  return folder.empty() ? std::string() : (folder / "jfpx" / kFileName).string();
+  return folder.empty() ? std::string() : to_text(folder / "jfpx" / kFileName);
 }
 
 CostModelOrigin this_machine() {
@@ -81,9 +72,10 @@ CostModelOrigin this_machine() {
 
 CalibratedCosts calibrated_costs() {
   const std::string path = cost_model_path();
-  if (path.empty()) return {{}, "there is no cache folder: HOME is not set"};
+  if (path.empty())
+    return {{}, std::string("there is no cache folder: ") + kCacheFolderVariable + " is not set"};
   std::error_code ignored;
-  if (!fs::exists(path, ignored)) return {{}, "this machine was not measured yet"};
+  if (!fs::exists(to_path(path), ignored)) return {{}, "this machine was not measured yet"};
   try {
     const MeasuredCostModel model = load_cost_model(path);
     const std::string problem = problem_with(model.origin);
@@ -96,9 +88,10 @@ CalibratedCosts calibrated_costs() {
 
 void store_costs(const CostModel& costs) {
   const std::string path = cost_model_path();
-  if (path.empty()) throw FileError("cannot store the costs: HOME is not set");
+  if (path.empty())
+    throw FileError(std::string("cannot store the costs: ") + kCacheFolderVariable + " is not set");
   std::error_code error;
-  fs::create_directories(fs::path(path).parent_path(), error);
+  fs::create_directories(to_path(path).parent_path(), error);
   if (error) throw FileError(path + ": cannot create its folder: " + error.message());
   save_cost_model({costs, this_machine()}, path);
 }

@@ -1,6 +1,7 @@
 /// Creation of engines, and their common options.
 #include "src/tool/engine.hpp"
 
+#include "src/base/system.hpp"
 #include "src/sphere_collider/cost_cache.hpp"
 #include "src/tool/bullet_engine.hpp"
 #include "src/tool/native_engine.hpp"
@@ -22,7 +23,8 @@ const CostModel& costs_of_this_machine(bool quiet) {
   static const CostModel costs = [quiet] {
     const CalibratedCosts cached = calibrated_costs();
     std::error_code ignored;
-    if (!quiet && !cached.problem.empty() && std::filesystem::exists(cost_model_path(), ignored)) {
+    if (!quiet && !cached.problem.empty() &&
+        std::filesystem::exists(to_path(cost_model_path()), ignored)) {
       fmt::print(stderr, "jfpx: default costs are used (see: jfpx calibrate): {}\n",
                  cached.problem);
     }

@@ -1,6 +1,8 @@
 /// Conversion of SIGHUP, SIGINT and SIGTERM to an exception.
 #include "src/tool/interrupts.hpp"
 
+#include <cstdlib>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace tool {
@@ -11,6 +13,27 @@ volatile std::sig_atomic_t g_signal = 0;
 extern "C" void remember_signal(int signal) { g_signal = signal; }
 
 }  // namespace
+
+#if defined(_WIN32)
+
+// The C run-time library resets a handler before it calls it.
+Interrupts::Interrupts() {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    before_[i] = std::signal(kSignals[i], remember_signal);
+    if (before_[i] != SIG_DFL) std::signal(kSignals[i], before_[i]);
+  }
+}
+
+Interrupts::~Interrupts() {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) std::signal(kSignals[i], before_[i]);
+}
+
+void end_by_signal(int) {
+  constexpr unsigned kStatusControlCExit = 0xC000013A;  // STATUS_CONTROL_C_EXIT
+  std::_Exit(static_cast<int>(kStatusControlCExit));
+}
+
+#else
 
 Interrupts::Interrupts() {
   struct sigaction action {};
@@ -25,6 +48,14 @@ Interrupts::Interrupts() {
 Interrupts::~Interrupts() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &before_[i], nullptr);
 }
+
+void end_by_signal(int signal) {
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+  std::abort();
+}
+
+#endif
 
 bool Interrupts::requested() { return g_signal != 0; }
 

@@ -17,7 +17,9 @@ struct Interrupted {
 
 /// During its lifetime, defers SIGHUP, SIGINT and SIGTERM to the next call of check(); a second
 /// signal ends the process immediately. Signals that were ignored at the start of the process
-/// remain ignored. Only one object may exist at a time, in one thread.
+/// remain ignored. On Windows, Ctrl-C and Ctrl-Break take the place of SIGINT
+/// and SIGHUP. Only one object may exist
+/// at a time, in one thread.
 class Interrupts {
  public:
   Interrupts();
@@ -31,9 +33,17 @@ class Interrupts {
   static void check();
 
  private:
+#if defined(_WIN32)
+  static constexpr std::array<int, 3> kSignals = {SIGINT, SIGBREAK, SIGTERM};
+  std::array<void (*)(int), kSignals.size()> before_{};
+#else
   static constexpr std::array<int, 3> kSignals = {SIGHUP, SIGINT, SIGTERM};
   std::array<struct sigaction, kSignals.size()> before_{};
+#endif
 };
+
+/// Ends the process as the signal itself would, so that the shell sees the reason.
+[[noreturn]] void end_by_signal(int signal);
 
 }  // namespace tool
 }  // namespace JFPX_ABI

@@ -2,6 +2,7 @@
 #include <jfpx/error.hpp>
 #include <jfpx/thesis/worst_first.hpp>
 
+#include "src/base/system.hpp"
 #include "src/tool/commands.hpp"
 #include "src/tool/interrupts.hpp"
 #include "src/tool/options.hpp"
@@ -11,7 +12,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <iterator>
@@ -59,7 +59,7 @@ std::vector<std::string> separate_program(const CLI::App& app, std::vector<std::
   return arguments;
 }
 
-int run(int argc, char** argv) {
+int run(const std::vector<std::string>& given) {
   CLI::App app("jfpx " JFPX_VERSION
                ": rigid-body collision with identical bits on the CPU, on CUDA and inside Bullet.",
                "jfpx");
@@ -90,8 +90,8 @@ int run(int argc, char** argv) {
   tool::add_scenes_command(app, status);
   tool::add_devices_command(app, status);
   tool::add_calibrate_command(app, status);
-  auto arguments = separate_program(app, std::vector<std::string>(argv + 1, argv + argc));
-  tool::switch_precision_if_requested(arguments, argv);
+  std::vector<std::string> arguments = separate_program(app, given);
+  tool::switch_precision_if_requested(arguments);
   std::ranges::reverse(arguments);
   try {
     app.parse(std::move(arguments));
@@ -106,11 +106,9 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     thesis::enable();
-    return finish_output(run(argc, argv));
+    return finish_output(run(start_program(argc, argv)));
   } catch (const tool::Interrupted& interrupted) {
-    // Ends the process by the signal itself, so that the shell sees the reason.
-    std::signal(interrupted.signal, SIG_DFL);
-    std::raise(interrupted.signal);
+    tool::end_by_signal(interrupted.signal);
   } catch (const BackendUnavailable& error) {
     fmt::print(stderr, "jfpx: {}\n", error.what());
     return tool::kBackendUnavailable;

@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/file.hpp"
+#include "src/base/system.hpp"
 #include "src/tool/mesh_readers.hpp"
 
 #include <algorithm>
@@ -19,7 +20,7 @@ namespace {
 
 /// The end of the name from the last dot, in lower case.
 std::string extension_of(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
+  std::string extension = to_text(to_path(path).extension());
   std::ranges::transform(extension, extension.begin(), [](char c) {
     return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   });

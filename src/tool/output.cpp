@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/file.hpp"
+#include "src/base/system.hpp"
 
 #include <fmt/format.h>
 
@@ -12,7 +13,6 @@
 #include <cerrno>
 #include <cstdio>
 #include <type_traits>
-#include <unistd.h>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -53,7 +53,7 @@ std::string Table::text() const {
 }
 
 Progress::Progress(std::string label, std::uint64_t total, bool quiet)
-    : label_(std::move(label)), total_(total), shown_(!quiet && isatty(STDERR_FILENO) != 0) {}
+    : label_(std::move(label)), total_(total), shown_(!quiet && is_terminal(stderr)) {}
 
 Progress::~Progress() {
   if (shown_ && percent_ >= 0) fmt::print(stderr, "\r{:79}\r", "");

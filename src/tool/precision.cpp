@@ -4,12 +4,11 @@
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
 
-#include <cerrno>
-#include <cstring>
+#include "src/base/system.hpp"
+
 #include <filesystem>
 #include <string>
 #include <string_view>
-#include <unistd.h>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -17,10 +16,12 @@ namespace tool {
 namespace {
 
 /// The same program in the other precision: NAME and NAME-f64 are in the same folder.
-std::string sibling_of(const std::string& name) {
+std::filesystem::path sibling_of(const std::filesystem::path& program) {
   constexpr std::string_view kSuffix = "-f64";
-  return name.ends_with(kSuffix) ? name.substr(0, name.size() - kSuffix.size())
-                                 : name + std::string(kSuffix);
+  const std::string name = to_text(program.stem());
+  const std::string sibling = name.ends_with(kSuffix) ? name.substr(0, name.size() - kSuffix.size())
+                                                      : name + std::string(kSuffix);
+  return program.parent_path() / to_path(sibling + to_text(program.extension()));
 }
 
 /// The precision that the arguments select; empty if they select none.
@@ -40,7 +41,7 @@ std::string selected_precision(const std::vector<std::string>& arguments) {
       ++i;  // a snapshot, not a recording
       continue;
     }
-    if (!arguments[i].starts_with('-') && std::filesystem::is_regular_file(arguments[i])) {
+    if (!arguments[i].starts_with('-') && std::filesystem::is_regular_file(to_path(arguments[i]))) {
       return recording_precision(arguments[i]);
     }
   }
@@ -49,18 +50,16 @@ std::string selected_precision(const std::vector<std::string>& arguments) {
 
 }  // namespace
 
-void switch_precision(const std::string& precision, char** argv) {
+void switch_precision(const std::string& precision, const std::vector<std::string>& arguments) {
   if (precision == kPrecision || (precision != "float" && precision != "double")) return;
-  const std::filesystem::path own = std::filesystem::read_symlink("/proc/self/exe");
-  const std::string sibling =
-      std::filesystem::path(own).replace_filename(sibling_of(own.filename())).string();
-  execv(sibling.c_str(), argv);
-  throw Error(sibling + ", the build in " + precision +
-              " precision, can't be started: " + std::strerror(errno));
+  const std::filesystem::path sibling = sibling_of(program_path());
+  const std::string reason = run_instead(sibling, arguments);
+  throw Error(to_text(sibling) + ", the build in " + precision +
+              " precision, can't be started: " + reason);
 }
 
-void switch_precision_if_requested(const std::vector<std::string>& arguments, char** argv) {
-  switch_precision(selected_precision(arguments), argv);
+void switch_precision_if_requested(const std::vector<std::string>& arguments) {
+  switch_precision(selected_precision(arguments), arguments);
 }
 
 }  // namespace tool

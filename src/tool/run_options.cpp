@@ -3,6 +3,7 @@
 
 #include <jfpx/error.hpp>
 
+#include "src/base/system.hpp"
 #include "src/tool/demo_names.hpp"
 #include "src/tool/scene_file.hpp"
 
@@ -19,7 +20,7 @@ namespace {
 
 bool looks_like_file(const std::string& name) {
   return name.find('/') != std::string::npos || name.ends_with(".json") ||
-         std::filesystem::exists(name);
+         std::filesystem::exists(to_path(name));
 }
 
 /// The first given option that applies to named scenes only; nullptr if there is none.

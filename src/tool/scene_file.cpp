@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/file.hpp"
+#include "src/base/system.hpp"
 #include "src/scene/scene_json_value.hpp"
 #include "src/tool/mesh_file.hpp"
 
@@ -82,7 +83,7 @@ class ShapeReader {
  private:
   TriangleMeshDef scaled_def(const FileShape& shape) {
     TriangleMeshDef& file = files_[shape.file];
-    if (file.triangles.empty()) file = read_mesh_file((folder_ / shape.file).string());
+    if (file.triangles.empty()) file = read_mesh_file(to_text(folder_ / to_path(shape.file)));
     TriangleMeshDef def = file;
     for (Vec3& vertex : def.vertices) vertex *= shape.scale;
     def.two_sided = shape.two_sided;
@@ -116,7 +117,7 @@ Scene scene_with_files(const std::string& path) {
   const std::vector<FileShape> shapes = take_file_shapes(&json);
   Scene scene = scene_from_value(json);
   if (shapes.empty()) return scene;
-  ShapeReader reader(std::filesystem::path(path).parent_path());
+  ShapeReader reader(to_path(path).parent_path());
   for (const FileShape& shape : shapes) {
     BodyDef& body = scene.bodies[shape.body];
     try {
@@ -134,7 +135,7 @@ Scene scene_with_files(const std::string& path) {
 Scene load_scene_file(const std::string& path) {
   if (is_mesh_file(path)) {
     Scene scene;
-    scene.name = std::filesystem::path(path).stem().string();
+    scene.name = to_text(to_path(path).stem());
     BodyDef& body = scene.bodies.emplace_back();
     body.mass = 0;
     try {

@@ -3,23 +3,26 @@
 #include <jfpx/recording.hpp>
 #include <jfpx/thesis/worst_first.hpp>
 
+#include "src/base/system.hpp"
 #include "src/tool/precision.hpp"
 #include "src/viewer/app.hpp"
 
 #include <fmt/format.h>
 
 #include <new>
+#include <string>
+#include <vector>
 
 namespace {
 
 using namespace jfpx;
 
-int run(int argc, char** argv) {
-  tool::switch_precision_if_requested({argv + 1, argv + argc}, argv);
+int run(const std::vector<std::string>& arguments) {
+  tool::switch_precision_if_requested(arguments);
   view::ViewOptions options;
-  if (const auto status = view::parse_command_line(argc, argv, options)) return *status;
+  if (const auto status = view::parse_command_line(arguments, options)) return *status;
   if (!options.precision_is_given && view::is_recording(options.run.scene)) {
-    tool::switch_precision(recording_precision(options.run.scene), argv);
+    tool::switch_precision(recording_precision(options.run.scene), arguments);
   }
   view::check(options);
   return view::run_app(options);
@@ -35,7 +38,7 @@ int fail(const char* what, int status) {
 int main(int argc, char** argv) {
   try {
     thesis::enable();
-    return run(argc, argv);
+    return run(start_program(argc, argv));
   } catch (const BackendUnavailable& error) {
     return fail(error.what(), tool::kBackendUnavailable);
   } catch (const DeviceError& error) {

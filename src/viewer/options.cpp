@@ -164,7 +164,7 @@ void add_view_options(CLI::App& app, ViewOptions& options) {
 
 }  // namespace
 
-std::optional<int> parse_command_line(int argc, char** argv, ViewOptions& options) {
+std::optional<int> parse_command_line(std::vector<std::string> arguments, ViewOptions& options) {
   CLI::App app("jfpx-view: shows scenes that run on the native engine or on Bullet.", "jfpx-view");
   app.set_version_flag("--version", "jfpx-view " JFPX_VERSION);
   std::string precision(tool::kPrecision);
@@ -182,8 +182,9 @@ std::optional<int> parse_command_line(int argc, char** argv, ViewOptions& option
       "F1 in the window lists all keys. Exit status: 0 success; 1 a check failed; 2 invalid usage\n"
       "or input; 3 backend, display or OpenGL not usable.");
   add_view_options(app, options);
+  std::ranges::reverse(arguments);  // as CLI11 takes them
   try {
-    app.parse(argc, argv);
+    app.parse(std::move(arguments));
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? tool::kSuccess : tool::kBadUsage;
   }

@@ -7,6 +7,8 @@
 #include "src/viewer/run.hpp"
 
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -39,9 +41,10 @@ struct ViewOptions {
   bool precision_is_given = false;  ///< --precision, which overrides that of a recording
 };
 
-/// Parses the command line; prints the help, the version or an error message.
+/// Parses the arguments after the name of the program; prints the help, the version or an error
+/// message.
 /// @return the exit status if the program must end, otherwise nothing
-std::optional<int> parse_command_line(int argc, char** argv, ViewOptions& options);
+std::optional<int> parse_command_line(std::vector<std::string> arguments, ViewOptions& options);
 /// Checks combinations of options. @throws InvalidArgument
 void check(const ViewOptions& options);
 

@@ -8,8 +8,11 @@
 #include <epoxy/gl.h>
 
 #include <cstring>
+
+#if defined(__linux__)
 #include <dlfcn.h>
 #include <link.h>
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -35,6 +38,7 @@ Extent size_by(void (*query)(SDL_Window*, int*, int*), SDL_Window* window) {
 /// Keeps the driver loaded: Mesa frees its memory only when the driver is unloaded, or never. The
 /// leak sanitizer then reports only leaks of this project.
 void keep_driver_for_leak_sanitizer() {
+#if defined(__linux__)
   if (!kAddressSanitizer) return;
   const auto keep = [](dl_phdr_info* library, std::size_t, void*) {
     for (const char* driver : {"_dri.so", "libEGL_mesa.so"}) {
@@ -44,6 +48,7 @@ void keep_driver_for_leak_sanitizer() {
     return 0;
   };
   dl_iterate_phdr(keep, nullptr);
+#endif
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 jfpx_add_test(base_test INTERNAL SOURCES
+  base/file_test.cpp
   base/growable_array_test.cpp
   base/math_test.cpp
   base/power_test.cpp

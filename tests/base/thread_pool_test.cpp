@@ -157,6 +157,7 @@ TEST(ThreadPool, SeparatesPoolsWhoseLoopsRunAtTheSameTime) {
       << "the calling thread, and a worker if another one had no core";
 }
 
+#if defined(__linux__)  // shows the threads of a process in a folder
 /// The threads of this process.
 long count_threads() {
   using Folder = std::filesystem::directory_iterator;
@@ -189,6 +190,7 @@ TEST(ThreadPool, StartsNoMoreThreadsThanTheLargestPoolOfAProcessHas) {
   const unsigned workers = std::max(kThreads, std::thread::hardware_concurrency()) - 1;
   EXPECT_LE(most - before, static_cast<long>(kCallers + workers));
 }
+#endif
 
 /// Sets flush-to-zero of the calling thread.
 void flush_denormals(bool flush) {

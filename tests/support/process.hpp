@@ -6,7 +6,13 @@
 #include <cstdio>
 #include <stdexcept>
 #include <string>
+
+#if defined(_WIN32)
+#define popen _popen
+#define pclose _pclose
+#else
 #include <sys/wait.h>
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -18,8 +24,18 @@ struct ProcessResult {
   std::string output;  ///< stdout, and stderr if the command line redirects it
 };
 
-/// Runs a shell command line.
-inline ProcessResult run_process(const std::string& command) {
+/// Redirects stderr to nothing, in a command line.
+#if defined(_WIN32)
+inline constexpr const char* kWithoutErrors = " 2>NUL";
+#else
+inline constexpr const char* kWithoutErrors = " 2>/dev/null";
+#endif
+
+/// Runs a command line of the system's shell.
+inline ProcessResult run_process(std::string command) {
+#if defined(_WIN32)
+  command = "\"" + command + "\"";  // cmd.exe removes the outer quotation marks
+#endif
   std::FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) throw std::runtime_error("can't start: " + command);
   ProcessResult result;
@@ -28,7 +44,11 @@ inline ProcessResult run_process(const std::string& command) {
     result.output.append(buffer, n);
   }
   const int status = pclose(pipe);
+#if defined(_WIN32)
+  result.status = status;
+#else
   result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+#endif
   return result;
 }
 

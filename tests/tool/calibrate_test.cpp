@@ -2,6 +2,8 @@
 #include <jfpx/backend.hpp>
 #include <jfpx/cost_model.hpp>
 
+#include "src/base/system.hpp"
+#include "tests/support/environment.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -9,9 +11,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 namespace jfpx {
 namespace {
@@ -22,9 +24,8 @@ using ::testing::Not;
 /// Runs the command with a separate cache folder.
 class Calibrate : public testing::Test {
  protected:
-  test::ProcessResult jfpx(const std::string& arguments, const char* redirect = "2>&1") {
-    return test::run_process("XDG_CACHE_HOME=" + folder_.file("") + " " + JFPX_TOOL_PATH + " " +
-                             arguments + " " + redirect);
+  test::ProcessResult jfpx(const std::string& arguments, const char* redirect = " 2>&1") {
+    return test::run_process(JFPX_TOOL_PATH " " + arguments + redirect);
   }
   std::string path() const {
     return folder_.file(sizeof(Real) == 4 ? "jfpx/cost-model-float.json"
@@ -37,10 +38,10 @@ class Calibrate : public testing::Test {
   static constexpr const char* kRun = "run gas --spheres 10 --steps 1 --hash";
 
   test::TemporaryFolder folder_;
+  test::EnvironmentVariable cache_{test::kCacheVariable, folder_.file("")};
 };
 
 TEST_F(Calibrate, StoresCostsThatProgramsCanLoad) {
-  setenv("XDG_CACHE_HOME", folder_.file("").c_str(), 1);
   const CalibratedCosts before = calibrated_costs();
   EXPECT_EQ(before.problem, "this machine was not measured yet");
   EXPECT_EQ(before.costs, CostModel());
@@ -52,7 +53,6 @@ TEST_F(Calibrate, StoresCostsThatProgramsCanLoad) {
   write("{");
   EXPECT_THAT(calibrated_costs().problem, HasSubstr(path()));
   EXPECT_EQ(calibrated_costs().costs, CostModel());
-  unsetenv("XDG_CACHE_HOME");
 }
 
 TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
@@ -71,7 +71,7 @@ TEST_F(Calibrate, StoresCostsThatTheOtherCommandsUse) {
   EXPECT_EQ(folder_.entries(), 1u);
 
   EXPECT_THAT(jfpx(kRun).output, Not(HasSubstr("default costs")));
-  const auto shown = jfpx("calibrate --show --json -", "2>/dev/null");
+  const auto shown = jfpx("calibrate --show --json -", test::kWithoutErrors);
   EXPECT_EQ(nlohmann::json::parse(shown.output)["cpu_all_pairs"]["pair_ns"],
             model.costs.cpu_all_pairs.pair_ns);
 }
@@ -82,7 +82,7 @@ TEST_F(Calibrate, ReportsCudaOnlyWhereItIsUsable) {
     if (status.backend == Backend::cuda) usable = status.usable;
   }
   for (const std::string command : {"calibrate --show", "calibrate"}) {
-    const auto result = jfpx(command, "2>/dev/null");
+    const auto result = jfpx(command, test::kWithoutErrors);
     EXPECT_THAT(result.output, HasSubstr("cpu: grid instead of all pairs"));
     EXPECT_EQ(result.output.find("cuda") != std::string::npos, usable) << result.output;
   }
@@ -129,7 +129,7 @@ TEST_F(Calibrate, AFileOfAnotherMachineDriverOrVersionIsIgnored) {
 }
 
 TEST_F(Calibrate, DefaultCostsAreNotAcceptedAsMeasured) {
-  write(jfpx("calibrate --show --json -", "2>/dev/null").output);
+  write(jfpx("calibrate --show --json -", test::kWithoutErrors).output);
   EXPECT_EQ(load_cost_model(path()).costs, CostModel());
   EXPECT_THAT(jfpx(kRun).output, HasSubstr("was measured on another machine: none"));
 }
@@ -143,11 +143,12 @@ TEST_F(Calibrate, AFolderThatCannotBeCreatedIsAnErrorOfCalibrateOnly) {
 }
 
 TEST_F(Calibrate, WithoutAHomeNothingIsStored) {
-  const std::string command = "env -u HOME -u XDG_CACHE_HOME " + std::string(JFPX_TOOL_PATH) + " ";
-  EXPECT_EQ(test::run_process(command + kRun + " 2>&1").status, 0);
-  const auto result = test::run_process(command + "calibrate --quiet 2>&1");
+  const test::EnvironmentVariable cache(test::kCacheVariable, std::nullopt);
+  const test::EnvironmentVariable home("HOME", std::nullopt);
+  EXPECT_EQ(jfpx(kRun).status, 0);
+  const auto result = jfpx("calibrate --quiet");
   EXPECT_EQ(result.status, 2);
-  EXPECT_THAT(result.output, HasSubstr("HOME is not set"));
+  EXPECT_THAT(result.output, HasSubstr(std::string(kCacheFolderVariable) + " is not set"));
 }
 
 }  // namespace

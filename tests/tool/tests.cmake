@@ -1,6 +1,6 @@
 jfpx_add_test(tool_test SOURCES tool/calibrate_test.cpp tool/tool_test.cpp
   LINK jfpx_demos nlohmann_json::nlohmann_json)
-jfpx_add_test(scene_file_test SOURCES tool/scene_file_test.cpp LINK jfpx_command_line)
+jfpx_add_test(scene_file_test SOURCES tool/interrupts_test.cpp tool/scene_file_test.cpp LINK jfpx_command_line)
 jfpx_add_test(cost_fit_test SOURCES
   tool/cost_fit_test.cpp
   ${PROJECT_SOURCE_DIR}/src/tool/cost_fit.cpp

@@ -27,7 +27,6 @@ namespace {
 
 using test::ProcessResult;
 using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 using ::testing::Not;
 
 constexpr const char* kOtherPrecision = sizeof(Real) == 4 ? "double" : "float";
@@ -38,7 +37,12 @@ ProcessResult jfpx_command(const std::string& arguments) {
 }
 /// Runs the command; its output is stdout only.
 ProcessResult jfpx_stdout(const std::string& arguments) {
-  return test::run_process(std::string(JFPX_TOOL_PATH) + " " + arguments + " 2>/dev/null");
+  return test::run_process(std::string(JFPX_TOOL_PATH) + " " + arguments + test::kWithoutErrors);
+}
+
+/// A line of 16 hexadecimal digits.
+bool is_hash(const std::string& text) {
+  return text.size() == 17 && text.find_first_not_of("0123456789abcdef") == 16 && text[16] == '\n';
 }
 
 bool cuda_usable() {
@@ -115,6 +119,7 @@ TEST(Tool, OptionsThatWouldDoNothingAreRefused) {
   }
 }
 
+#if !defined(_WIN32)  // devices in the file system
 TEST(Tool, OutputThatIsLostIsAnError) {
   for (const std::string arguments : {"--version", "scenes", "scenes pile --spheres 5 --export",
                                       "run pile --steps 1 --quiet --json -"}) {
@@ -139,6 +144,7 @@ TEST(Tool, ResultsGoThroughLinksToDevices) {
   EXPECT_TRUE(std::filesystem::is_symlink(link));
   EXPECT_EQ(folder.entries(), 1u);
 }
+#endif
 
 TEST(Tool, JsonIsTheOnlyOutputOnStdout) {
   for (const std::string command : {"run", JFPX_HAS_BULLET ? "compare" : "run"}) {
@@ -182,6 +188,7 @@ TEST(Tool, NumbersOutOfRangeNameTheRange) {
                "is -1; it must be a whole number from 0 to 18446744073709551615");
 }
 
+#if !defined(_WIN32)  // programs that send signals
 TEST(Tool, AnInterruptedRunLeavesNoFiles) {
   for (const auto& [signal, status] : {std::pair("INT", 130), {"TERM", 143}, {"HUP", 129}}) {
     const test::TemporaryFolder folder;
@@ -195,6 +202,7 @@ TEST(Tool, AnInterruptedRunLeavesNoFiles) {
     EXPECT_EQ(folder.entries(), 0u) << signal;
   }
 }
+#endif
 
 TEST(Tool, BadInputIsStatusTwoAndNamed) {
   expect_fails("run plie", 2, "there is no scene called \"plie\"");
@@ -205,6 +213,12 @@ TEST(Tool, BadInputIsStatusTwoAndNamed) {
   expect_fails("run missing.json", 2, "missing.json: can't be opened");
   expect_fails("run pile --threads 100000", 2, "threads");
 }
+
+#if !JFPX_HAS_BULLET || !defined(__linux__)
+TEST(Tool, PreloadSaysWhyItIsNotAvailable) {
+  expect_fails("preload program --option", 3, "preload: ");
+}
+#endif
 
 TEST(Tool, SceneFilesAreChecked) {
   const test::TemporaryFolder folder;
@@ -229,11 +243,13 @@ TEST(Tool, ABodyThatRunsAwayIsNamedAndStatusOne) {
 }
 
 TEST(Tool, ProgressIsDrawnOnTerminalsOnly) {
+#if !defined(_WIN32)
   const std::string run = std::string(JFPX_TOOL_PATH) + " run pile --spheres 8 --steps 30";
   EXPECT_THAT(test::run_process("script -qec '" + run + "' /dev/null").output,
               HasSubstr("100% 30/30"));
   EXPECT_THAT(test::run_process("script -qec '" + run + " --quiet' /dev/null").output,
               Not(HasSubstr("%")));
+#endif
   EXPECT_THAT(jfpx_command("run pile --spheres 8 --steps 30").output, Not(HasSubstr("%")));
 }
 
@@ -271,7 +287,7 @@ TEST(Tool, DemosRunWithTheirInputsAndRepeatExactly) {
   const std::string arguments = "run ballistic --steps 30 --quiet --hash";
   const ProcessResult shots = jfpx_stdout(arguments + " --input " + script);
   EXPECT_EQ(shots.status, 0);
-  EXPECT_THAT(shots.output, MatchesRegex("[0-9a-f]{16}\n"));
+  EXPECT_TRUE(is_hash(shots.output)) << shots.output;
   EXPECT_EQ(jfpx_stdout(arguments + " --input " + script).output, shots.output);
   EXPECT_NE(jfpx_stdout(arguments).output, shots.output);
   const auto json = nlohmann::json::parse(
@@ -332,7 +348,7 @@ TEST(Tool, HashIsTheLastLineAndRepeats) {
   const std::string arguments = "run pile --spheres 50 --steps 20 --hash";
   const ProcessResult loud = jfpx_stdout(arguments);
   const ProcessResult quiet = jfpx_stdout(arguments + " --quiet");
-  EXPECT_THAT(quiet.output, MatchesRegex("[0-9a-f]{16}\n"));
+  EXPECT_TRUE(is_hash(quiet.output)) << quiet.output;
   EXPECT_THAT(loud.output, ::testing::EndsWith("\n" + quiet.output));
   EXPECT_EQ(jfpx_stdout(arguments + " --quiet --threads 3").output, quiet.output);
   EXPECT_NE(jfpx_stdout(arguments + " --quiet --seed 2").output, quiet.output);
@@ -342,7 +358,7 @@ TEST(Tool, TheResolverAndItsSubstepsAreSelected) {
   const std::string arguments = "run pile --spheres 30 --steps 40 --quiet --hash --resolver ";
   const std::string worst_first = jfpx_stdout(arguments + "worst-first").output;
   const std::string soft_step = jfpx_stdout(arguments + "soft-step").output;
-  EXPECT_THAT(soft_step, MatchesRegex("[0-9a-f]{16}\n"));
+  EXPECT_TRUE(is_hash(soft_step)) << soft_step;
   EXPECT_NE(soft_step, worst_first);
   EXPECT_NE(jfpx_stdout(arguments + "soft-step --substeps 7").output, soft_step);
   EXPECT_EQ(jfpx_stdout(arguments + "soft-step --threads 3").output, soft_step);

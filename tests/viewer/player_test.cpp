@@ -8,13 +8,13 @@
 #include "src/sphere_collider/cost_cache.hpp"
 #include "src/viewer/exchangeable_collider.hpp"
 #include "src/viewer/forces.hpp"
+#include "tests/support/environment.hpp"
 #include "tests/support/seed.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <random>
 
 namespace jfpx {
@@ -139,15 +139,12 @@ TEST(Player, ReportsTheBackendOfBulletsSolver) {
 
 TEST(Player, UsesTheCostsThatWereMeasuredOnThisMachine) {
   const test::TemporaryFolder folder;
-  const char* before = std::getenv("XDG_CACHE_HOME");
-  const std::string kept = before != nullptr ? before : "";
-  setenv("XDG_CACHE_HOME", folder.file("").c_str(), 1);
+  const test::EnvironmentVariable cache(test::kCacheVariable, folder.file(""));
   EXPECT_EQ(collider_options({}).costs, CostModel());  // not measured yet
   CostModel costs;
   costs.cpu_all_pairs.call_us = 123;
   store_costs(costs);
   EXPECT_EQ(collider_options({}).costs, costs);
-  before != nullptr ? setenv("XDG_CACHE_HOME", kept.c_str(), 1) : unsetenv("XDG_CACHE_HOME");
 }
 
 TEST(Player, AnUnusableBackendLeavesTheRunUnchanged) {

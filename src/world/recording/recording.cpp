@@ -11,6 +11,7 @@
 #include "src/base/atomic_file.hpp"
 #include "src/base/file.hpp"
 #include "src/base/hash64.hpp"
+#include "src/base/system.hpp"
 #include "src/scene/scene_json.hpp"
 
 #include <algorithm>
@@ -223,7 +224,7 @@ struct RecordingReader::Impl {
 RecordingReader::RecordingReader(const std::string& path) : impl_(std::make_unique<Impl>()) {
   Impl& impl = *impl_;
   impl.path = path;
-  impl.file.open(path, std::ios::binary);
+  impl.file.open(to_path(path), std::ios::binary);
   const Prefix prefix = read_prefix(impl.file, path);
   if (prefix.real_size != sizeof(Real)) {
     impl.fail(std::string("was recorded in ") + precision_name(prefix.real_size) +
@@ -302,7 +303,7 @@ std::string RecordingReader::calls(std::uint64_t step) {
 }
 
 std::string recording_precision(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file(to_path(path), std::ios::binary);
   return precision_name(read_prefix(file, path).real_size);
 }
 
