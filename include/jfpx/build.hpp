@@ -28,7 +28,7 @@ struct LibraryUsesSameCompilerSwitches {
 
 /// A translation unit that is compiled with other switches refers to an undefined symbol, so that
 /// linking fails.
-[[gnu::used]] static constexpr const char* kLayoutCheck =
+[[gnu::used]] static const char* const kLayoutCheck =
     &LibraryUsesSameCompilerSwitches<sizeof(LayoutProbe)>::value;
 
 }  // namespace detail

@@ -15,7 +15,7 @@ inline namespace JFPX_ABI {
 /// Machine epsilon of Real. A vector of at most this length has no direction.
 inline constexpr Real kEpsilon = std::numeric_limits<Real>::epsilon();
 /// The largest finite Real, as a constant, because device code can't call numeric_limits.
-inline constexpr Real kMaxReal = std::numeric_limits<Real>::max();
+inline constexpr Real kMaxReal = (std::numeric_limits<Real>::max)();  // not the macro of windows.h
 inline constexpr Real kPi = static_cast<Real>(3.14159265358979323846);
 
 /// Correctly rounded square root, with the same bits from nvcc and the host compilers.
@@ -323,8 +323,7 @@ JFPX_HD constexpr void fill_column_major(const Mat4& a, Real out[16]) {
 
 /// An axis-aligned bounding box. The default is empty.
 struct Aabb {
-  Vec3 lower{std::numeric_limits<Real>::max(), std::numeric_limits<Real>::max(),
-             std::numeric_limits<Real>::max()};
+  Vec3 lower{kMaxReal, kMaxReal, kMaxReal};
   Vec3 upper{std::numeric_limits<Real>::lowest(), std::numeric_limits<Real>::lowest(),
              std::numeric_limits<Real>::lowest()};
   friend bool operator==(const Aabb&, const Aabb&) = default;

@@ -2,10 +2,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/tool/bullet_engine.hpp"
-#include "src/tool/commands.hpp"
 #include "src/tool/comparison.hpp"
-
-#include <CLI/CLI.hpp>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -17,12 +14,6 @@ std::unique_ptr<Engine> make_bullet_engine(EngineKind kind, const Scene&, const 
 
 Comparison compare(const Scene&, const RunOptions&) {
   throw BackendUnavailable("compare: built without Bullet");
-}
-
-void add_preload_command(CLI::App& app, int&) {
-  CLI::App* command = app.add_subcommand("preload", "Not available: built without Bullet");
-  command->prefix_command();
-  command->callback([] { throw BackendUnavailable("preload: built without Bullet"); });
 }
 
 }  // namespace tool

@@ -24,7 +24,7 @@ namespace bullet {
 /// also supports children of compounds. A jfpx::bullet::CollisionDispatcher does not need it: with
 /// any SPHERE/SPHERE create function other than Bullet's, every dispatch runs in Bullet's code.
 /// Thread safety is that of Bullet's algorithms.
-class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorithm {
+class JFPX_BULLET_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorithm {
  public:
   /// Gets a new manifold from the dispatcher, as the constructor of Bullet's algorithm does for its
   /// create function. If the manifold pool is exhausted, the algorithm has no effect.
@@ -45,7 +45,7 @@ class JFPX_API SphereSphereAlgorithm final : public btActivatingCollisionAlgorit
 
   /// Create function for a dispatcher. It ignores a manifold in the construction info, as Bullet's
   /// does: in a compound, every child has a manifold of its own.
-  struct JFPX_API CreateFunc final : btCollisionAlgorithmCreateFunc {
+  struct JFPX_BULLET_API CreateFunc final : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* body0,
                                                    const btCollisionObjectWrapper* body1) override;

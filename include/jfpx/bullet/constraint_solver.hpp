@@ -46,7 +46,7 @@ enum class SolverFallback : std::uint8_t {
 inline constexpr std::size_t kSolverFallbacks = 10;
 
 /// Returns a short text for a table, for example "small group".
-JFPX_API std::string_view to_string(SolverFallback fallback) noexcept;
+JFPX_BULLET_API std::string_view to_string(SolverFallback fallback) noexcept;
 
 struct ConstraintSolverStats {
   std::uint64_t groups = 0;     ///< groups solved by jfpx
@@ -68,7 +68,7 @@ struct ConstraintSolverStats {
 /// reason. Programs that include Bullet's headers need -ffp-contract=off, which linking
 /// jfpx::bullet adds. As in Bullet, only one thread at a time may use a solver; different solvers
 /// are independent.
-class JFPX_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
+class JFPX_BULLET_API ConstraintSolver : public btSequentialImpulseConstraintSolver {
  public:
   BT_DECLARE_ALIGNED_ALLOCATOR();
 

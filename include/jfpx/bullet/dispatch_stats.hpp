@@ -27,7 +27,7 @@ enum class Fallback : std::uint8_t {
 inline constexpr std::size_t kFallbackCount = 9;
 
 /// A short text for a table, for example "small batch".
-JFPX_API std::string_view to_string(Fallback fallback) noexcept;
+JFPX_BULLET_API std::string_view to_string(Fallback fallback) noexcept;
 
 /// Reason why a batch updated the manifolds in Bullet's order on one thread, which is slower. The
 /// bits are identical either way. The first reason that applies is counted.
@@ -43,7 +43,7 @@ enum class OrderReason : std::uint8_t {
 inline constexpr std::size_t kOrderReasonCount = 7;
 
 /// A short text for a table, for example "contact callback".
-JFPX_API std::string_view to_string(OrderReason reason) noexcept;
+JFPX_BULLET_API std::string_view to_string(OrderReason reason) noexcept;
 
 /// Reason why Bullet processed a pair of a convex and a concave shape on one thread. The bits are
 /// identical either way.
@@ -59,7 +59,7 @@ enum class ConcaveFallback : std::uint8_t {
 inline constexpr std::size_t kConcaveFallbackCount = 7;
 
 /// A short text for a table, for example "class of the concave shape".
-JFPX_API std::string_view to_string(ConcaveFallback fallback) noexcept;
+JFPX_BULLET_API std::string_view to_string(ConcaveFallback fallback) noexcept;
 
 /// Counters since construction or reset_stats(). Pairs are counted only in batches; a batch without
 /// active bodies changes no manifold and counts only `pairs`.

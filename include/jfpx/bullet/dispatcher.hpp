@@ -42,7 +42,7 @@ struct DispatcherOptions {
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds;
 /// stats().warning reports a program that is compiled otherwise. As in Bullet, only one thread at a
 /// time may use a dispatcher; different dispatchers are independent.
-class JFPX_API CollisionDispatcher : public btCollisionDispatcher {
+class JFPX_BULLET_API CollisionDispatcher : public btCollisionDispatcher {
  public:
   // The constructors are inlined into the program, to check how it is compiled.
 

@@ -33,7 +33,7 @@ struct DynamicsWorldOptions {
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds.
 /// As in Bullet, only one thread at a time may use a world; different worlds are independent.
-class JFPX_API DynamicsWorld : public btDiscreteDynamicsWorld {
+class JFPX_BULLET_API DynamicsWorld : public btDiscreteDynamicsWorld {
  public:
   BT_DECLARE_ALIGNED_ALLOCATOR();
 

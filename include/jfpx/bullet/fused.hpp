@@ -18,9 +18,8 @@ namespace bullet {
 /// the calling file.
 [[gnu::always_inline]] inline bool fuses_products() noexcept {
   constexpr btScalar kStep = std::numeric_limits<btScalar>::epsilon();
-  btScalar a = 1 + kStep, b = 1 - kStep, c = -1;
-  asm("" : "+m"(a), "+m"(b), "+m"(c));  // prevents constant folding
-  return a * b + c != 0;                // 1 - kStep^2 is 1 if it is rounded
+  const volatile btScalar a = 1 + kStep, b = 1 - kStep, c = -1;  // no constant folding
+  return a * b + c != 0;  // 1 - kStep^2 is 1 if it is rounded
 }
 
 }  // namespace bullet

@@ -64,7 +64,7 @@ struct StageTimes {
 ///   Bullet's sleep thresholds keep their defaults, because Bullet measures motion differently.
 ///
 /// Not thread-safe; different worlds may be used by different threads.
-class JFPX_API SceneWorld {
+class JFPX_BULLET_API SceneWorld {
  public:
   /// @throws InvalidScene, also for joints, and for features that Bullet lacks: a two-sided plane,
   ///   an inertia that is not diagonal, a combine rule of friction or restitution other than

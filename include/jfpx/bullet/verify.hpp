@@ -27,20 +27,21 @@ struct Difference {
 };
 
 /// One line of text: step, location, field, and both values in decimal and hexadecimal.
-JFPX_API std::string to_text(const Difference& difference);
+JFPX_BULLET_API std::string to_text(const Difference& difference);
 
 /// Compares two worlds bit by bit: all manifolds in the order of the dispatchers' arrays, with
 /// their bodies, thresholds and every field of every point (for m_userPersistentData, only whether
 /// it is set); then all bodies in array order with transforms, velocities and activation.
 /// @param step is copied into the result.
 /// @return the first difference; empty if the worlds are identical.
-JFPX_API std::optional<Difference> first_difference(btDynamicsWorld& expected,
-                                                    btDynamicsWorld& actual, std::uint64_t step);
+JFPX_BULLET_API std::optional<Difference> first_difference(btDynamicsWorld& expected,
+                                                           btDynamicsWorld& actual,
+                                                           std::uint64_t step);
 
 /// Compares the contacts that SphereCollider::find_contacts() finds among the spheres of a Bullet
 /// world with the points that Bullet creates in the same step: pairs, and the bits of normal,
 /// distance and point on sphere b.
-class JFPX_API ContactCheck {
+class JFPX_BULLET_API ContactCheck {
  public:
   explicit ContactCheck(std::unique_ptr<SphereCollider> collider = make_sphere_collider());
   ~ContactCheck();

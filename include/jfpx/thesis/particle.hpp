@@ -73,7 +73,7 @@ struct ParticleReport {
 
 /// Particles and their motion. Const functions may run concurrently with each other; every other
 /// function excludes all other calls. Steps are deterministic to the last bit, with any collider.
-class JFPX_API ParticleWorld {
+class JFPX_THESIS_API ParticleWorld {
  public:
   /// @throws InvalidArgument with the name of the bad setting; BackendUnavailable
   explicit ParticleWorld(const ParticleSettings& settings = {});

@@ -10,7 +10,7 @@ namespace thesis {
 
 /// Must be called once, before the first World that uses one of them is created, restored or
 /// replayed. Further calls have no effect. May run concurrently with any function.
-JFPX_API void enable() noexcept;
+JFPX_THESIS_API void enable() noexcept;
 
 }  // namespace thesis
 }  // namespace JFPX_ABI

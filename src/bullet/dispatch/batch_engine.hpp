@@ -24,7 +24,7 @@ struct DispatcherTraits {
 
 /// Runs dispatches as batches. One engine may serve several dispatchers, one call at a time,
 /// because it validates the state of earlier dispatches before use.
-class JFPX_API BatchEngine {
+class JFPX_BULLET_API BatchEngine {
  public:
   /// @throws InvalidArgument if `collider` is null.
   BatchEngine(std::unique_ptr<SphereCollider> collider, const DispatcherOptions& options);

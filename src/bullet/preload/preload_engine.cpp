@@ -78,8 +78,8 @@ DispatchStats sum_of_stats(std::string_view* backend) {
 
 extern "C" {
 
-JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, const void* info,
-                                        void* argument) {
+JFPX_SYMBOL_EXPORT bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache,
+                                                  const void* info, void* argument) {
   const ObjectPool<BatchEngine>::Handle engine(pool());
   if (engine.get() == nullptr) return false;
   btCollisionDispatcher& own = *static_cast<btCollisionDispatcher*>(dispatcher);
@@ -90,7 +90,7 @@ JFPX_API bool jfpx_preload_try_dispatch(void* dispatcher, void* pair_cache, cons
                                 static_cast<btDispatcher*>(argument));
 }
 
-JFPX_API void jfpx_preload_print_summary(std::FILE* to, const char* prefix) {
+JFPX_SYMBOL_EXPORT void jfpx_preload_print_summary(std::FILE* to, const char* prefix) {
   using Count = unsigned long long;
   std::string_view backend = "none";
   const DispatchStats stats = sum_of_stats(&backend);

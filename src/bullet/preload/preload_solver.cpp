@@ -165,9 +165,10 @@ void print_solver_summary(std::FILE* to, const char* prefix) {
 extern "C" {
 
 /// Supports exactly Bullet's class, because a derived class may use the inherited state.
-JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count, void** manifolds,
-                                     int manifold_count, void** joints, int joint_count,
-                                     const void* info, void* drawer, void* dispatcher) {
+JFPX_SYMBOL_EXPORT bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count,
+                                               void** manifolds, int manifold_count, void** joints,
+                                               int joint_count, const void* info, void* drawer,
+                                               void* dispatcher) {
   auto* own = static_cast<btSequentialImpulseConstraintSolver*>(solver);
   if (!is_exactly<btSequentialImpulseConstraintSolver>(*own)) return false;
   if (static_cast<std::size_t>(manifold_count) < minimum_batch()) {
@@ -187,7 +188,7 @@ JFPX_API bool jfpx_preload_try_solve(void* solver, void** bodies, int body_count
 }
 
 /// Supports every class of world, because the function uses only the public interface.
-JFPX_API bool jfpx_preload_try_update_boxes(void* world) {
+JFPX_SYMBOL_EXPORT bool jfpx_preload_try_update_boxes(void* world) {
   const ObjectPool<BoxUpdater>::Handle ours(box_updaters());
   if (ours.get() == nullptr) return false;
   if (!ours.get()->update.run(*static_cast<btCollisionWorld*>(world), ours.get()->threads)) {

@@ -13,7 +13,7 @@ class GroupSolver;
 
 namespace bullet {
 
-struct JFPX_API ConstraintSolverTestAccess {
+struct JFPX_BULLET_API ConstraintSolverTestAccess {
   /// Creates a solver that uses `device` as its GPU, as options.backend specifies.
   static std::unique_ptr<ConstraintSolver> make(std::unique_ptr<GroupSolver> device,
                                                 const ConstraintSolverOptions& options);

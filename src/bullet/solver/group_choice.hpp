@@ -13,7 +13,7 @@ namespace bullet {
 /// Groups whose rows fill at least half of the vector lanes are always solved by jfpx. For other
 /// groups, both alternatives are measured by group size, because their times depend on the bodies
 /// that the contacts share, on the processor and on joints. Not thread-safe.
-class JFPX_API GroupChoice {
+class JFPX_BULLET_API GroupChoice {
  public:
   /// Whether Bullet's own code should solve the group.
   bool leaves_to_bullet(std::size_t manifolds);

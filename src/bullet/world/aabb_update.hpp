@@ -23,7 +23,7 @@ namespace bullet {
 /// the order of the objects. New volumes, overlaps and new pairs are therefore computed in
 /// parallel. Then the leaves are moved one after the other, and the new pairs of each leaf are
 /// added in Bullet's order.
-class JFPX_API AabbUpdate {
+class JFPX_BULLET_API AabbUpdate {
  public:
   /// @param minimum_objects fewer objects are updated serially, which is then faster
   explicit AabbUpdate(int minimum_objects = 256) : minimum_objects_(minimum_objects) {}

@@ -17,7 +17,7 @@ namespace bullet {
 
 /// In every step with changes, Bullet tests some or all pairs. The tests are independent and run in
 /// parallel; the removals run serially.
-class JFPX_API PairCleanup {
+class JFPX_BULLET_API PairCleanup {
  public:
   /// @param minimum_pairs with fewer pairs to test, Bullet's own code runs
   explicit PairCleanup(int minimum_pairs = 4096) : minimum_pairs_(minimum_pairs) {}

@@ -16,7 +16,7 @@ namespace bullet {
 
 /// To remove one object, Bullet visits all pairs of the pair cache twice. This class searches them
 /// once, in parallel.
-class JFPX_API ProxyRemoval {
+class JFPX_BULLET_API ProxyRemoval {
  public:
   /// Has the effect of btCollisionWorld::removeCollisionObject() on the broadphase, the pair cache
   /// and the handle of the object. Returns false, without a change, for an object without a proxy,
