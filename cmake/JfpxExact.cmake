@@ -12,12 +12,30 @@ endif()
 # target supports it, which every ARM64 processor does. Users inline the headers of jfpx and Bullet, so the
 # flag that disables contraction is a usage requirement.
 set(JFPX_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-ffp-contract=off>)
+# Files with kernels that are selected at run time enable the instructions that they need.
+set(JFPX_AVX2_FLAGS -mavx2 -mpopcnt)
+set(JFPX_AVX512_FLAGS -mavx512f -mavx512bw -mavx512dq -mavx512vl -mpopcnt)
+if(MSVC) # clang-cl; programs that link jfpx may be compiled by cl
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "MSVC")
+    message(FATAL_ERROR "The compiler is cl, which has no vector types: build jfpx with clang-cl, which Visual Studio "
+      "includes (cmake -T ClangCL). Programs that link jfpx may be compiled by cl.")
+  endif()
+  set(JFPX_EXACT_FLAGS $<$<COMPILE_LANGUAGE:CXX>:/fp:precise>
+    $<$<COMPILE_LANG_AND_ID:CXX,MSVC>:/fp:contract-> $<$<COMPILE_LANG_AND_ID:CXX,Clang>:/clang:-ffp-contract=off>)
+  set(JFPX_AVX2_FLAGS /arch:AVX2)
+  set(JFPX_AVX512_FLAGS /arch:AVX512)
+endif()
 # On x86-64 the flag is not sufficient: g++ 12 vectorises alternating sums and differences of products to
 # vfmaddsub regardless of it. Therefore FMA, and AVX-512, which includes FMA, are disabled for all files of
-# jfpx, for any -march that users choose. Files with kernels that are selected at run time enable what they
-# need. ARM64 has no option without fused instructions; scripts/check arm searches the binaries for them.
+# jfpx, for any -march that users choose. ARM64 has no option without fused instructions; scripts/check arm
+# searches the binaries for them.
 set(JFPX_OWN_EXACT_FLAGS "")
-if(JFPX_PROCESSOR STREQUAL "x86_64")
+if(JFPX_PROCESSOR STREQUAL "x86_64" AND NOT MSVC)
   set(JFPX_OWN_EXACT_FLAGS
     $<$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>:-mno-fma;-mno-fma4;-mno-avx512f>)
+endif()
+# On Windows, g++ aligns no variable on the stack to more than 16 bytes, but accesses vectors of 32 and 64 bytes there by
+# instructions that require their alignment (GCC bug 54412). The assembler replaces these instructions.
+if(MINGW)
+  list(APPEND JFPX_OWN_EXACT_FLAGS $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wa,-muse-unaligned-vector-move>)
 endif()

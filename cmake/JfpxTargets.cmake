@@ -9,7 +9,7 @@ configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
 # Flags for the files of jfpx only; they are not usage requirements.
 add_library(jfpx_warnings INTERFACE)
 target_compile_options(jfpx_warnings INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wconversion;-Wshadow>
+  $<$<COMPILE_LANGUAGE:CXX>:$<IF:$<BOOL:${MSVC}>,/W3,-Wall;-Wextra;-Wconversion;-Wshadow>>
   # g++ reports members of private types in a source that another source includes.
   $<$<AND:$<COMPILE_LANG_AND_ID:CXX,GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${JFPX_WERROR}>>:-Werror>)

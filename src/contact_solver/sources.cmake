@@ -15,6 +15,6 @@ if(JFPX_PROCESSOR STREQUAL "x86_64")
   foreach(kernels IN ITEMS sequential_impulse/cpu/row_kernels_avx2 soft_step/cpu/sweeps_avx2)
     list(APPEND JFPX_SOURCES ${CMAKE_CURRENT_LIST_DIR}/${kernels}.cpp)
     set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/${kernels}.cpp
-      PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+      PROPERTIES COMPILE_OPTIONS "${JFPX_AVX2_FLAGS}")
   endforeach()
 endif()

@@ -40,8 +40,8 @@ if(JFPX_PROCESSOR STREQUAL "x86_64")
     ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
     ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp)
   set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
-    PROPERTIES COMPILE_OPTIONS "-mavx2;-mpopcnt")
+    PROPERTIES COMPILE_OPTIONS "${JFPX_AVX2_FLAGS}")
   # g++ 12 reports an uninitialized value in its own _mm512_undefined_epi32() (GCC bug 105593).
   set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp
-    PROPERTIES COMPILE_OPTIONS "-mavx512f;-mavx512bw;-mavx512dq;-mavx512vl;-mpopcnt;$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
+    PROPERTIES COMPILE_OPTIONS "${JFPX_AVX512_FLAGS};$<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>")
 endif()

@@ -6,14 +6,24 @@
 #include <algorithm>
 #include <cstdlib>
 #include <new>
+
+#if defined(_WIN32)
+#include <windows.h>
+#else
 #include <sys/mman.h>
+#endif
 
 namespace jfpx::test {
 
 Arena::Arena() {
+#if defined(_WIN32)
+  void* const memory = VirtualAlloc(nullptr, kRange * kClasses, MEM_RESERVE, PAGE_READWRITE);
+  if (memory == nullptr) throw std::bad_alloc();
+#else
   void* memory = mmap(nullptr, kRange * kClasses, PROT_READ | PROT_WRITE,
                       MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
+#endif
   begin_ = static_cast<char*>(memory);
   arenas_.push_back(this);
 }
@@ -21,7 +31,11 @@ Arena::Arena() {
 Arena::~Arena() {
   if (selected_ == this) selected_ = nullptr;
   std::erase(arenas_, this);
+#if defined(_WIN32)
+  VirtualFree(begin_, 0, MEM_RELEASE);
+#else
   munmap(begin_, kRange * kClasses);
+#endif
 }
 
 void Arena::install() { btAlignedAllocSetCustomAligned(allocate_from_selected, release_from_any); }
@@ -37,6 +51,9 @@ void* Arena::allocate(std::size_t size) {
   void* memory = begin_ + index * kRange + sizes.used;
   sizes.used += (index + 1) * kStep;
   if (sizes.used > kRange) throw std::bad_alloc();
+#if defined(_WIN32)  // does not commit pages by itself
+  if (VirtualAlloc(memory, size, MEM_COMMIT, PAGE_READWRITE) == nullptr) throw std::bad_alloc();
+#endif
   return memory;
 }
 

@@ -1,32 +1,83 @@
 /// Callbacks that log their calls, and a function of Bullet that is replaced.
 #include "tests/bullet/random_world_globals.hpp"
 
-#include "src/bullet/preload/vtable.hpp"
 #include "tests/bullet/stack_bytes.hpp"
 
 #include <BulletCollision/CollisionDispatch/btConvexConvexAlgorithm.h>
 
+#if defined(_WIN32)
+#include <cstddef>
+#include <windows.h>
+#else
+#include "src/bullet/preload/vtable.hpp"
+
 #include <dlfcn.h>
+#endif
 
 #define JFPX_PROCESS_COLLISION                          \
   "_ZN23btConvexConvexAlgorithm16processCollisionEPK24" \
   "btCollisionObjectWrapperS2_RK16btDispatcherInfoP16btManifoldResult"
 
-/// Replaces the function of Bullet's library in its virtual table, for both worlds. Bullet's reads
-/// variables that it has not set: the points of a simplex without vertices, if GJK ends before its
-/// first one because a squared distance exceeds BT_LARGE_FLOAT (1e18 in float, 1e30 in double), and
-/// the fourth component of a normal, for a capsule and a sphere with the same centre. Here they are
-/// 0, whatever the process, the compiler or the other world has left on the stack.
+// The function of Bullet's library is replaced in its virtual table, for both worlds. Bullet's
+// reads variables that it has not set: the points of a simplex without vertices, if GJK ends before
+// its first one because a squared distance exceeds BT_LARGE_FLOAT (1e18 in float, 1e30 in double),
+// and the fourth component of a normal, for a capsule and a sphere with the same centre. Here they
+// are 0, whatever the process, the compiler or the other world has left on the stack.
+namespace {
+
+using ProcessCollision = void (*)(btConvexConvexAlgorithm*, const btCollisionObjectWrapper*,
+                                  const btCollisionObjectWrapper*, const btDispatcherInfo&,
+                                  btManifoldResult*);
+
+inline void process_with_clear_stack(ProcessCollision original, btConvexConvexAlgorithm* algorithm,
+                                     const btCollisionObjectWrapper* a,
+                                     const btCollisionObjectWrapper* b,
+                                     const btDispatcherInfo& info, btManifoldResult* result) {
+  jfpx::bullet::fill_stack(0);
+  original(algorithm, a, b, info, result);
+  asm volatile("");  // no tail call: the frame must begin where fill_stack() did
+}
+
+}  // namespace
+
+#if defined(_WIN32)
+// Bullet is linked statically, and a member function is called as a function of the object is.
+extern "C" {
+extern void* g_vtable[] asm("_ZTV23btConvexConvexAlgorithm");
+void original_process_collision(btConvexConvexAlgorithm*, const btCollisionObjectWrapper*,
+                                const btCollisionObjectWrapper*, const btDispatcherInfo&,
+                                btManifoldResult*) asm(JFPX_PROCESS_COLLISION);
+}
+
+namespace {
+
+void process_collision(btConvexConvexAlgorithm* algorithm, const btCollisionObjectWrapper* a,
+                       const btCollisionObjectWrapper* b, const btDispatcherInfo& info,
+                       btManifoldResult* result) {
+  process_with_clear_stack(original_process_collision, algorithm, a, b, info, result);
+}
+
+[[maybe_unused]] const bool g_is_replaced = [] {
+  constexpr std::size_t kSlots = 7;  // offset, type, two destructors, and three functions
+  for (std::size_t i = 2; i < kSlots; ++i) {
+    if (g_vtable[i] != reinterpret_cast<void*>(original_process_collision)) continue;
+    DWORD before = 0;
+    if (VirtualProtect(&g_vtable[i], sizeof g_vtable[i], PAGE_READWRITE, &before) == 0)
+      return false;
+    g_vtable[i] = reinterpret_cast<void*>(process_collision);
+    return true;
+  }
+  return false;
+}();
+
+}  // namespace
+#else
 [[gnu::visibility("default")]] void btConvexConvexAlgorithm::processCollision(
     const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
     const btDispatcherInfo& info, btManifoldResult* result) {
-  using Function =
-      void (*)(btConvexConvexAlgorithm*, const btCollisionObjectWrapper*,
-               const btCollisionObjectWrapper*, const btDispatcherInfo&, btManifoldResult*);
-  static const auto original = reinterpret_cast<Function>(dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION));
-  jfpx::bullet::fill_stack(0);
-  original(this, a, b, info, result);
-  asm volatile("");  // no tail call: the frame must begin where fill_stack() did
+  static const auto original =
+      reinterpret_cast<ProcessCollision>(dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION));
+  process_with_clear_stack(original, this, a, b, info, result);
 }
 
 namespace {
@@ -35,6 +86,7 @@ namespace {
     dlsym(RTLD_DEFAULT, "_ZTV23btConvexConvexAlgorithm"), dlsym(RTLD_NEXT, JFPX_PROCESS_COLLISION),
     dlsym(RTLD_DEFAULT, JFPX_PROCESS_COLLISION));
 }  // namespace
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {

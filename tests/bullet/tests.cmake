@@ -119,7 +119,7 @@ if(JFPX_BULLET_SOURCE)
 endif()
 
 # The library serves programs of both precisions.
-if(JFPX_TOOL AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
+if(JFPX_TOOL AND TARGET jfpx_bullet_preload AND JFPX_BULLET_F32_FOUND AND JFPX_BULLET_F64_FOUND)
   jfpx_add_executable(bullet_stock_program SOURCES bullet/stock_program.cpp
     LINK jfpx_bullet3rd Threads::Threads)
   jfpx_add_executable(bullet_environment_program SOURCES bullet/environment_program.cpp

@@ -4,6 +4,9 @@
 #include <atomic>
 #include <cstdlib>
 #include <limits>
+#if defined(_WIN32)
+#include <malloc.h>
+#endif
 
 namespace {
 
@@ -19,14 +22,23 @@ void* allocate(std::size_t bytes, std::size_t alignment) {
     has_failed = true;
     throw std::bad_alloc();
   }
+#if defined(_WIN32)
+  void* const memory = _aligned_malloc(bytes > 0 ? bytes : 1, alignment);
+#else
   void* memory = nullptr;
-  if (posix_memalign(&memory, alignment, bytes) != 0) throw std::bad_alloc();
+  if (posix_memalign(&memory, alignment, bytes) != 0) memory = nullptr;
+#endif
+  if (memory == nullptr) throw std::bad_alloc();
   ++alive;
   return memory;
 }
 void release(void* memory) noexcept {
   if (memory != nullptr) --alive;
+#if defined(_WIN32)
+  _aligned_free(memory);
+#else
   std::free(memory);
+#endif
 }
 
 }  // namespace

@@ -9,9 +9,18 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
-#include <malloc.h>
 #include <string>
+
+#if defined(_WIN32)
+#include <windows.h>
+// after windows.h
+#include <psapi.h>
+#undef near
+#undef far
+#else
+#include <malloc.h>
 #include <unistd.h>
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -23,6 +32,18 @@ inline std::uint64_t soak_steps() {
   return text != nullptr ? std::strtoull(text, nullptr, 0) : 10'000;
 }
 
+#if defined(_WIN32)
+/// Not known on Windows.
+inline std::size_t bytes_in_use() { return 0; }
+
+/// [bytes], private memory of the process.
+inline std::size_t resident_bytes() {
+  PROCESS_MEMORY_COUNTERS_EX counters{};
+  GetProcessMemoryInfo(GetCurrentProcess(), reinterpret_cast<PROCESS_MEMORY_COUNTERS*>(&counters),
+                       sizeof counters);
+  return counters.PrivateUsage;
+}
+#else
 /// [bytes] allocated by malloc. Always 0 under sanitizers, which replace malloc.
 inline std::size_t bytes_in_use() {
   const struct mallinfo2 info = mallinfo2();
@@ -36,6 +57,7 @@ inline std::size_t resident_bytes() {
   file >> size >> resident;
   return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
+#endif
 
 /// Calls step(n) for n = 0, 1, ..., `steps` - 1, and expects that memory use does not grow in the
 /// second half, except for buffers that grow when a step has more contacts than all before.

@@ -12,13 +12,16 @@
 
 #include <csignal>
 #include <cstring>
-#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+
+#if !defined(_WIN32)
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#endif
 
 namespace jfpx {
 namespace {
@@ -83,7 +86,7 @@ TEST(Recording, OfNoBodiesMayHaveMoreFramesThanBytes) {
   EXPECT_EQ(RecordingReader(path).steps(), 5000u);
 }
 
-TEST(Recording, IsFinishedOnceAndNotAfterAFailedWrite) {
+TEST(Recording, IsFinishedOnce) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.rec");
   RecordingWriter writer(path, header_of(17));
@@ -92,7 +95,11 @@ TEST(Recording, IsFinishedOnceAndNotAfterAFailedWrite) {
   EXPECT_THROW(writer.finish(), FileError);
   EXPECT_THROW(writer.append(random_states(17, 2)), FileError);
   EXPECT_EQ(RecordingReader(path).steps(), 1u);
+}
 
+#if !defined(_WIN32)  // has no limit of the size of a file
+TEST(Recording, IsNotFinishedAfterAFailedWrite) {
+  const test::TemporaryFolder folder;
   const std::string full = folder.file("full.rec");
   RecordingWriter unlucky(full, header_of(1000));
   rlimit before{};
@@ -106,6 +113,7 @@ TEST(Recording, IsFinishedOnceAndNotAfterAFailedWrite) {
   EXPECT_THROW(unlucky.finish(), FileError) << "there is room again, but a frame is cut off";
   EXPECT_FALSE(std::ifstream(full));
 }
+#endif
 
 TEST(Recording, UnfinishedFileDoesNotAppear) {
   const test::TemporaryFolder folder;
@@ -215,6 +223,7 @@ TEST(Recording, WithANameThatIsNotUtf8IsReadBackWithAReplacement) {
   EXPECT_EQ(RecordingReader(path).header().scene.name, "caf\xef\xbf\xbd");
 }
 
+#if !defined(_WIN32)  // has no pipes in folders, and links for privileged users only
 TEST(Recording, IsWrittenThroughASymbolicLink) {
   const test::TemporaryFolder folder;
   const std::string path = folder.file("run.rec"), link = folder.file("link.rec");
@@ -245,6 +254,7 @@ TEST(Recording, IsWrittenIntoAPipeWithoutReplacingIt) {
   EXPECT_TRUE(std::filesystem::is_fifo(pipe));
   close(reader);
 }
+#endif
 
 TEST(Recording, UnwritablePathIsNamed) {
   const test::TemporaryFolder folder;

@@ -1,40 +1,41 @@
 # Builds and runs the pinned hashes with each compiler, optimisation level and kind of processor, and searches the
 # programs for fused products:
-#   cmake -DBINARY_DIR=... -DCONFIG_DIR=<where jfpx/config.hpp is> [-DLAUNCHER=ccache] [-DPROCESSOR=aarch64]
+#   cmake -DBINARY_DIR=... -DCONFIG_DIR=<where jfpx/config.hpp is> [-DLAUNCHER=ccache] [-DTOOLCHAIN=aarch64-linux-gnu]
 #         [-DALL=ON] [-DTHREADS="1;3"] -P run.cmake
 # Without ALL the two ends: not optimised for any processor of the architecture, and most of all for the best that can
-# run. With it, all of them and as many threads as 1 to 8. PROCESSOR is x86_64 or aarch64; the other than this machine's
-# is compiled with cmake/aarch64-linux-gnu.cmake and runs under qemu. What can't run here is said and left out.
+# run. With it, all of them and as many threads as 1 to 8. TOOLCHAIN is the name of a toolchain file in cmake, for another
+# system or processor than this machine's; its programs run in an emulator. What can't run here is said and left out.
 cmake_host_system_information(RESULT host QUERY OS_PLATFORM)
-if(NOT PROCESSOR)
-  set(PROCESSOR ${host})
-endif()
+set(processor ${host})
 set(toolchain "")
 set(emulator "")
-set(gcc_prefix "")
-if(NOT PROCESSOR STREQUAL host)
-  set(toolchain ${CMAKE_CURRENT_LIST_DIR}/../../../cmake/${PROCESSOR}-linux-gnu.cmake)
+set(prefix "")
+set(gcc g++)
+if(TOOLCHAIN)
+  set(toolchain ${CMAKE_CURRENT_LIST_DIR}/../../../cmake/${TOOLCHAIN}.cmake)
   include(${toolchain})
+  set(processor ${CMAKE_SYSTEM_PROCESSOR})
   set(emulator ${CMAKE_CROSSCOMPILING_EMULATOR})
-  set(gcc_prefix ${PROCESSOR}-linux-gnu-)
+  set(prefix ${TOOLCHAIN}-)
+  set(gcc ${CMAKE_CXX_COMPILER})
 endif()
 
 # Kinds of processors, the best last, and what each has that those before it have not and the compilers use.
-if(PROCESSOR STREQUAL "x86_64")
+if(processor STREQUAL "x86_64")
   set(kinds x86-64-v2 x86-64-v3 x86-64-v4)
   set(needs_x86-64-v2 sse4_2 ssse3 popcnt)
   set(needs_x86-64-v3 avx2 fma bmi2)
   set(needs_x86-64-v4 avx512f avx512dq avx512vl)
   set(fused "vfn?m(add|sub)")
-elseif(PROCESSOR STREQUAL "aarch64")
+elseif(processor STREQUAL "aarch64")
   set(kinds armv8.2-a armv9-a)
   set(needs_armv8.2-a asimdrdm dcpop)
   set(needs_armv9-a sve2)
   set(fused "[[:space:]](fn?m(add|sub)|fn?ml[as]|fn?m(ad|sb)|fcmla|fmlal|fmlsl)2?[[:space:]]") # scalar, NEON, SVE
 else()
-  message(FATAL_ERROR "jfpx does not support ${PROCESSOR}")
+  message(FATAL_ERROR "jfpx does not support ${processor}")
 endif()
-if(NOT emulator) # qemu emulates all of them
+if(processor STREQUAL host) # qemu emulates all of them
   file(STRINGS /proc/cpuinfo flags REGEX "^(flags|Features)" LIMIT_COUNT 1)
   foreach(kind IN LISTS kinds)
     foreach(need IN LISTS needs_${kind})
@@ -68,10 +69,10 @@ if(NOT THREADS)
   set(THREADS 1)
 endif()
 
-find_program(objdump ${gcc_prefix}objdump REQUIRED)
+find_program(objdump ${prefix}objdump REQUIRED)
 cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
 set(others "")
-foreach(compiler IN ITEMS ${gcc_prefix}g++ clang++)
+foreach(compiler IN ITEMS ${gcc} clang++)
   find_program(path_of_${compiler} ${compiler})
   if(NOT path_of_${compiler})
     message("skipped: ${compiler} is not installed")
@@ -81,7 +82,7 @@ foreach(compiler IN ITEMS ${gcc_prefix}g++ clang++)
     string(REPLACE " -march=" "-" folder "${flavour}")
     set(build ${BINARY_DIR}/${compiler}${folder})
     if(toolchain)
-      set(build ${BINARY_DIR}/${PROCESSOR}/${compiler}${folder})
+      set(build ${BINARY_DIR}/${TOOLCHAIN}/${compiler}${folder})
     endif()
     execute_process(
       COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build} -G Ninja --no-warn-unused-cli
@@ -100,7 +101,7 @@ foreach(compiler IN ITEMS ${gcc_prefix}g++ clang++)
       file(READ ${program}.out output)
       file(STRINGS ${program}.status result)
       # Also where no scene comes by.
-      execute_process(COMMAND ${objdump} -d ${program} COMMAND grep -cE "${fused}"
+      execute_process(COMMAND ${objdump} -d ${program}${CMAKE_EXECUTABLE_SUFFIX} COMMAND grep -cE "${fused}"
         OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE RESULTS_VARIABLE results)
       if(NOT results MATCHES "^0;")
         message(FATAL_ERROR "${objdump} can't read ${program}")
