@@ -261,7 +261,7 @@ class SphereCollider:
             As jfpx.find_contacts(); the type of the positions is not `dtype`; `out` is too small,
             and the message has the number of contacts; with `count`, more spheres than reserve()
             has allowed.
-        OutOfMemory, DeviceError, BackendUnavailable
+        OutOfMemory, KeyboardInterrupt, DeviceError, BackendUnavailable
             As jfpx.find_contacts(); with backend="cuda", DeviceError also for arrays in host
             memory. The collider stays usable.
         """
@@ -296,7 +296,8 @@ class SphereCollider:
 
         Raises
         ------
-        ConcurrentUse, InvalidArgument, OutOfMemory, DeviceError, BackendUnavailable
+        ConcurrentUse, InvalidArgument, OutOfMemory, KeyboardInterrupt, DeviceError,
+        BackendUnavailable
             As find_contacts().
         """
         if _device.is_on_device(positions):
@@ -680,6 +681,9 @@ def find_contacts(positions: Any, radii: Any, *, batch: Any = None, periodic: An
         option out of its range; offsets that do not ascend from 0 to N; a bad length of a cell.
     OutOfMemory
         In host memory, or in that of the device.
+    KeyboardInterrupt
+        Ctrl-C was pressed during a search of the main thread, in host memory. A search on a device
+        is completed first.
     DeviceError, BackendUnavailable
         For arrays on a device: a call of CUDA failed, or the package has no CUDA, or the device
         cannot be used.
@@ -753,7 +757,7 @@ def find_pairs(positions: Any, cutoff: Any = None, *, radii: Any = None, query: 
 
     Raises
     ------
-    InvalidArgument, OutOfMemory, DeviceError, BackendUnavailable
+    InvalidArgument, OutOfMemory, KeyboardInterrupt, DeviceError, BackendUnavailable
         As find_contacts(). InvalidArgument also for arguments that exclude each other, or that
         require another.
     """

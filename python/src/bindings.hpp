@@ -4,6 +4,8 @@
 
 #include <jfpx/jfpx.hpp>
 
+#include "src/base/interrupt.hpp"
+
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -35,6 +37,17 @@ class ConcurrentUse : public Error {
 class Closed : public Error {
  public:
   using Error::Error;
+};
+
+/// Runs the signal handlers of Python that are due. Only the main thread has any.
+/// @throws nb::python_error for an exception of a handler, such as KeyboardInterrupt
+inline void handle_signals() {
+  const nb::gil_scoped_acquire acquire;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+/// Ends searches of the calling thread by an exception of a signal handler.
+struct SignalInterrupt : Interrupt {
+  SignalInterrupt() : Interrupt(handle_signals) {}
 };
 
 /// Marks an object as in use for the lifetime of the guard.

@@ -1,6 +1,6 @@
 /// Binding of the sphere collider: a search keeps its contacts, which are then written to arrays
 /// of their number. The caller keeps other threads away between the two; the calls release
-/// Python's global lock.
+/// Python's global lock, and Ctrl-C ends them.
 #include "python/src/bindings.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-using Release = nb::call_guard<nb::gil_scoped_release>;
+using Release = nb::call_guard<nb::gil_scoped_release, SignalInterrupt>;
 
 /// Centres, and a radius for each or one for all.
 struct Spheres {
@@ -93,10 +93,10 @@ class Collider {
   template <class Index>
   void write_pairs(const Rows<Index>& pairs) {
     visit([&](const auto& found) {
-      for (std::size_t i = 0; i < found.size(); ++i) {
+      for_each_interruptible(found.size(), [&](std::size_t i) {
         pairs(0, i) = static_cast<Index>(found[i].a);
         pairs(1, i) = static_cast<Index>(found[i].b);
-      }
+      });
     });
   }
   template <class Index>
@@ -104,21 +104,22 @@ class Collider {
     visit([&](const auto& found) {
       const std::vector<std::uint64_t> begins = row_offsets(found, rows_);
       for (std::size_t i = 0; i <= rows_; ++i) offsets(i) = static_cast<std::int64_t>(begins[i]);
-      for (std::size_t i = 0; i < found.size(); ++i) columns(i) = static_cast<Index>(found[i].b);
+      for_each_interruptible(found.size(),
+                             [&](std::size_t i) { columns(i) = static_cast<Index>(found[i].b); });
     });
   }
   void write_contacts(const Rows<Real>& normals, const Vector<Real>& distances) {
-    for (std::size_t i = 0; i < found_.size(); ++i) {
+    for_each_interruptible(found_.size(), [&](std::size_t i) {
       set_row(normals, i, found_[i].normal);
       distances(i) = found_[i].distance;
-    }
+    });
   }
 
   /// Writes the shifts of the last search, which must have been in a periodic cell.
   void write_shifts(const Rows<std::int32_t>& shifts) {
-    for (std::size_t i = 0; i < shifts_.size(); ++i) {
+    for_each_interruptible(shifts_.size(), [&](std::size_t i) {
       for (std::size_t k = 0; k < 3; ++k) shifts(i, k) = shifts_[i][k];
-    }
+    });
   }
 
   std::string_view backend() const { return to_string(collider_->backend()); }
@@ -136,10 +137,10 @@ class Collider {
   std::size_t keep(const std::vector<PeriodicContact>& contacts) {
     list_.clear();
     shifts_.clear();
-    for (const PeriodicContact& c : contacts) {
-      list_.push_back(c.contact);
-      shifts_.push_back(c.shift);
-    }
+    for_each_interruptible(contacts.size(), [&](std::size_t i) {
+      list_.push_back(contacts[i].contact);
+      shifts_.push_back(contacts[i].shift);
+    });
     found_ = list_;
     return found_.size();
   }

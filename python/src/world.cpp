@@ -4,7 +4,6 @@
 #include "src/scene/scene_validate.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <string>
 
 namespace jfpx {
@@ -199,8 +198,7 @@ StepReport PythonWorld::step() {
 }
 
 StepReport PythonWorld::run(std::uint64_t steps) {
-  using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::milliseconds kBetweenSignals(20);
+  using Clock = Interrupt::Clock;
   World& world = get();
   const UseGuard guard(in_use_, "world");
   const nb::gil_scoped_release release;
@@ -208,9 +206,8 @@ StepReport PythonWorld::run(std::uint64_t steps) {
   Clock::time_point checked = Clock::now();
   for (std::uint64_t i = 0; i < steps && !report.non_finite; ++i) {
     report = world.step();
-    if (Clock::now() - checked < kBetweenSignals) continue;
-    const nb::gil_scoped_acquire acquire;
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
+    if (Clock::now() - checked < Interrupt::kInterval) continue;
+    handle_signals();
     checked = Clock::now();
   }
   return report;

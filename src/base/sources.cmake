@@ -8,6 +8,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cpu.cpp
   ${CMAKE_CURRENT_LIST_DIR}/error.cpp
   ${CMAKE_CURRENT_LIST_DIR}/file.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/interrupt.cpp
   ${CMAKE_CURRENT_LIST_DIR}/rotation.cpp
   ${CMAKE_CURRENT_LIST_DIR}/system_${system}.cpp
   ${CMAKE_CURRENT_LIST_DIR}/thread_pool.cpp

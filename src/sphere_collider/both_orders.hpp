@@ -3,6 +3,8 @@
 
 #include <jfpx/config.hpp>
 
+#include "src/base/interrupt.hpp"
+
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -21,10 +23,10 @@ std::vector<Item> both_orders(std::span<const Item> items, std::size_t spheres,
                               ContactOf&& contact_of, Opposite&& opposite) {
   // Row i has the contacts of sphere i with lower indices, then those with higher ones.
   std::vector<std::uint64_t> lower(spheres), higher(spheres);
-  for (const Item& item : items) {
-    ++higher[contact_of(item).a];
-    ++lower[contact_of(item).b];
-  }
+  for_each_interruptible(items.size(), [&](std::size_t i) {
+    ++higher[contact_of(items[i]).a];
+    ++lower[contact_of(items[i]).b];
+  });
   std::uint64_t begin = 0;
   for (std::size_t i = 0; i < spheres; ++i) {
     const std::uint64_t lower_count = lower[i], higher_count = higher[i];
@@ -32,11 +34,12 @@ std::vector<Item> both_orders(std::span<const Item> items, std::size_t spheres,
     higher[i] = begin + lower_count;
     begin += lower_count + higher_count;
   }
-  std::vector<Item> result(2 * items.size());
-  for (const Item& item : items) {
-    result[higher[contact_of(item).a]++] = item;
-    result[lower[contact_of(item).b]++] = opposite(item);
-  }
+  std::vector<Item> result;
+  resize_interruptible(&result, 2 * items.size());
+  for_each_interruptible(items.size(), [&](std::size_t i) {
+    result[higher[contact_of(items[i]).a]++] = items[i];
+    result[lower[contact_of(items[i]).b]++] = opposite(items[i]);
+  });
   return result;
 }
 

@@ -1,6 +1,7 @@
 /// Contact lists between two sets, of many systems, in both orders and as compressed rows.
 #include <jfpx/contact_list.hpp>
 
+#include "src/base/interrupt.hpp"
 #include "src/sphere_collider/both_orders.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
 
@@ -11,7 +12,8 @@ namespace {
 template <class Item>
 std::vector<std::uint64_t> offsets_of(std::span<const Item> items, std::size_t rows) {
   std::vector<std::uint64_t> offsets(rows + 1);
-  for (const Item& item : items) ++offsets[item.a + std::size_t{1}];
+  for_each_interruptible(items.size(),
+                         [&](std::size_t i) { ++offsets[items[i].a + std::size_t{1}]; });
   for (std::size_t i = 0; i < rows; ++i) offsets[i + 1] += offsets[i];
   return offsets;
 }
@@ -43,6 +45,7 @@ std::vector<SphereContact> find_contacts_in_systems(SphereCollider& collider,
   detail::check_spheres(spheres);  // here, so that messages count all spheres
   std::vector<SphereContact> result;
   for (std::size_t i = 1; i < offsets.size(); ++i) {
+    poll_interrupt();
     const std::uint64_t begin = offsets[i - 1];
     for (SphereContact contact :
          collider.find_contacts(spheres.subspan(begin, offsets[i] - begin))) {

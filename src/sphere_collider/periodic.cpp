@@ -1,6 +1,7 @@
 /// Contacts in a periodic cell, by a search among the spheres and the images near the cell.
 #include <jfpx/periodic.hpp>
 
+#include "src/base/interrupt.hpp"
 #include "src/sphere_collider/both_orders.hpp"
 #include "src/sphere_collider/periodic_input.hpp"
 #include "src/sphere_collider/sphere_input.hpp"
@@ -22,9 +23,9 @@ struct Reduced {
 Reduced reduce_all(std::span<const SphereInstance> spheres, const PeriodicCell& cell) {
   Reduced reduced{std::vector<SphereInstance>(spheres.size()),
                   std::vector<ImageShift>(spheres.size())};
-  for (std::size_t i = 0; i < spheres.size(); ++i) {
+  for_each_interruptible(spheres.size(), [&](std::size_t i) {
     reduced.spheres[i] = detail::reduced(spheres[i], cell, &reduced.cells[i]);
-  }
+  });
   return reduced;
 }
 
@@ -38,7 +39,7 @@ std::vector<detail::PeriodicImage> append_images(std::vector<SphereInstance>* sp
                                                  const PeriodicCell& cell, Real reach) {
   std::vector<detail::PeriodicImage> images;
   const std::size_t n = spheres->size();
-  for (std::size_t i = 0; i < n; ++i) {
+  for_each_interruptible(n, [&](std::size_t i) {
     const SphereInstance sphere = (*spheres)[i];
     std::uint32_t codes = detail::near_images(sphere.centre, cell, reach);
     for (; codes != 0; codes &= codes - 1) {
@@ -46,7 +47,7 @@ std::vector<detail::PeriodicImage> append_images(std::vector<SphereInstance>* sp
       images.push_back({static_cast<SphereIndex>(i), code});
       spheres->push_back(detail::image_of(sphere, detail::shift_of(code), cell));
     }
-  }
+  });
   return images;
 }
 
@@ -79,8 +80,14 @@ std::vector<PeriodicContact> find_in_cell(SphereCollider& collider,
     const PairResult found = detail::touch_at(spheres[a], spheres[b], shift, cell);
     if (found.touching != 0) result.push_back({{a, b, found.normal, found.distance}, shift});
   };
+  SphereIndex polled = 0;
   for (const SpherePair* row = pairs.data(); row != pairs.data() + pairs.size() && row->a < n;) {
     const SphereIndex a = row->a;
+    constexpr SphereIndex kRowsPerPoll = 256;
+    if (a - polled >= kRowsPerPoll) {
+      poll_interrupt();
+      polled = a;
+    }
     const SpherePair *sphere = row, *image = row;
     const auto is_in_row = [&](const SpherePair* at) {
       return at != pairs.data() + pairs.size() && at->a == a;
@@ -134,6 +141,7 @@ std::vector<PeriodicContact> find_periodic_contacts_in_systems(
   detail::check_in_cells(cells, spheres, offsets);
   std::vector<PeriodicContact> result;
   for (std::size_t i = 0; i < cells.size(); ++i) {
+    poll_interrupt();
     const auto first = static_cast<SphereIndex>(offsets[i]);
     const auto system = spheres.subspan(first, offsets[i + 1] - first);
     for (PeriodicContact& c : find_in_cell(collider, system, cells[i])) {

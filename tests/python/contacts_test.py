@@ -3,6 +3,8 @@
 import gc
 import pickle
 import resource
+import subprocess
+import sys
 import threading
 import time
 
@@ -393,8 +395,6 @@ def test_a_gpu_that_is_missing_is_a_named_exception():
 
 def test_memory_that_is_missing_is_a_named_exception(dtype):
     # In a child, because the limit holds for the whole process.
-    import subprocess
-    import sys
     code = f"""
 import numpy as np, resource, jfpx
 points = np.zeros((300_000, 3), "{dtype}")
@@ -464,6 +464,38 @@ def test_memory_is_reserved_for_a_device_and_not_during_a_search(rng):
     stop.set()
     thread.join()
     assert refused
+
+
+@pytest.mark.parametrize("search", [
+    "jfpx.find_pairs(points, 0.05)",
+    "jfpx.find_pairs(points, 0.05, periodic=(1, 1, 1))",
+    "jfpx.find_contacts(points, 0.025, threads=2, half=False)",
+    "collider.find_contacts(points, 1e-7)",
+    "collider.find_pairs(points, 1e-7, query=points[:5])",
+    "collider.find_pairs(points, 1e-7, batch=[0, 10, len(points)], output='csr')",
+    "collider.find_pairs(points, 1e-7, periodic=(1, None, 1))",
+])
+def test_ctrl_c_ends_a_search(search):
+    # Alone, each search takes minutes or more memory than the limit.
+    code = f"""
+import os, resource, signal, threading
+import numpy as np, jfpx
+points = np.random.default_rng(1).random((2_000_000, 3))
+limit = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize() + (6 << 30)
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+collider = jfpx.SphereCollider("float64", backend="cpu", algorithm="all_pairs")
+try:
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    {search}
+except KeyboardInterrupt:
+    # Python also raises it after a search that has run out of memory.
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 4 << 20
+    few = points[:1000]
+    assert np.array_equal(collider.find_pairs(few, 0.1), jfpx.find_pairs(few, 0.1))
+    print("KeyboardInterrupt")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert done.stdout == "KeyboardInterrupt\n", done.stderr
 
 
 def test_threads_may_search_at_the_same_time(rng):

@@ -1,6 +1,7 @@
 /// The sweep over classes of radii; the header describes the algorithm.
 #include "src/sphere_collider/cpu/cell_sweep.hpp"
 
+#include "src/base/interrupt.hpp"
 #include "src/base/parallel_for.hpp"
 
 #include <algorithm>
@@ -230,7 +231,7 @@ PairOrder CellSweep::search(const Kernels& kernels, const SphereTable& queries, 
   const std::size_t step = queries_per_chunk(queries.count());
   const std::size_t chunks = (queries.count() + step - 1) / step;
   const std::size_t first_chunk = pairs->add(chunks);
-  pool.run(chunks, [&](std::size_t chunk) {
+  run_interruptible(pool, chunks, [&](std::size_t chunk) {
     PairSearch s{queries.columns(), targets_.columns(), self, 0, 0, nullptr};
     s.first = static_cast<std::uint32_t>(chunk * step);
     s.last = static_cast<std::uint32_t>(std::min<std::size_t>(s.first + step, queries.count()));

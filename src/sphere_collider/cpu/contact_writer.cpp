@@ -2,6 +2,7 @@
 /// thread.
 #include "src/sphere_collider/cpu/contact_writer.hpp"
 
+#include "src/base/interrupt.hpp"
 #include "src/collide/sphere_pair.hpp"
 #include "src/sphere_collider/cpu/pair_filter.hpp"
 
@@ -137,7 +138,7 @@ std::span<const Item> ContactWriter::write_chunks(const PairChunks& chunks, Thre
     total += chunks[i].size();
   }
   items->reserve(total, "contacts");
-  pool.run(chunks.size(), [&](std::size_t i) {
+  run_interruptible(pool, chunks.size(), [&](std::size_t i) {
     std::transform(chunks[i].begin(), chunks[i].end(), items->data() + sections_[i], make);
   });
   return {items->data(), total};
@@ -159,7 +160,7 @@ std::span<const SpherePair> ContactWriter::write_rows(std::size_t spheres, const
   const std::size_t rows_per_part = std::size_t{1} << part_bits;
   reserve_workspaces(std::min<std::size_t>(parts, pool.threads()), grouped ? 0 : rows_per_part,
                      parts);
-  pool.run(parts, [&](std::size_t part) {
+  run_interruptible(pool, parts, [&](std::size_t part) {
     const std::size_t first = part << part_bits;
     const std::size_t last = std::min(spheres, first + rows_per_part);
     if (first >= last) return;
@@ -226,7 +227,7 @@ unsigned ContactWriter::index_rows(const PairChunks& chunks, std::size_t spheres
                                    ThreadPool& pool) {
   rows_.reserve(spheres, "rows of pairs");
   std::fill_n(rows_.data(), spheres, Row{});
-  pool.run(chunks.size(), [&](std::size_t chunk) {
+  run_interruptible(pool, chunks.size(), [&](std::size_t chunk) {
     const std::span<const std::uint64_t> all = chunks[chunk];
     for (std::size_t i = 0; i < all.size();) {
       const std::size_t begin = i;
@@ -307,7 +308,7 @@ unsigned ContactWriter::divide(const PairChunks& chunks, std::size_t spheres, Th
   const unsigned bucket_bits = bits > 18 ? bits - 8 : kPartBits;
   const std::size_t buckets = (spheres >> bucket_bits) + 1;
   offsets_.reserve(chunks.size() * buckets, "counts of pairs");
-  pool.run(chunks.size(), [&](std::size_t chunk) {
+  run_interruptible(pool, chunks.size(), [&](std::size_t chunk) {
     std::uint64_t* counts = offsets_.data() + chunk * buckets;
     std::fill_n(counts, buckets, 0u);
     for (const std::uint64_t p : chunks[chunk]) ++counts[lower(p) >> bucket_bits];
@@ -323,7 +324,7 @@ unsigned ContactWriter::divide(const PairChunks& chunks, std::size_t spheres, Th
   }
   sections_[buckets] = sum;
   pairs_.reserve(sum, "pairs");
-  pool.run(chunks.size(), [&](std::size_t chunk) {
+  run_interruptible(pool, chunks.size(), [&](std::size_t chunk) {
     std::uint64_t* next = offsets_.data() + chunk * buckets;
     for (const std::uint64_t p : chunks[chunk]) {
       pairs_[next[lower(p) >> bucket_bits]++] = std::bit_cast<SpherePair>(p);

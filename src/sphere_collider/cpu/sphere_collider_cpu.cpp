@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/cpu.hpp"
+#include "src/base/interrupt.hpp"
 #include "src/collide/sphere_pair.hpp"
 #include "src/sphere_collider/cpu/cell_sweep.hpp"
 #include "src/sphere_collider/cpu/contact_writer.hpp"
@@ -134,7 +135,7 @@ class SphereColliderCpu final : public SphereCollider {
     constexpr std::size_t kRows = 64;  // rows differ in length: many chunks balance the load
     const std::size_t chunks = (spheres.size() + kRows - 1) / kRows;
     pairs_.add(chunks);
-    pool_.run(chunks, [&](std::size_t chunk) {
+    run_interruptible(pool_, chunks, [&](std::size_t chunk) {
       pairs_.fill(chunk, [&](PairSink* sink) {
         const std::size_t end = std::min(spheres.size(), (chunk + 1) * kRows);
         kernels_.search_all({table_.columns(), table_.columns(), true,
