@@ -143,9 +143,9 @@ def indices(array: Any, name: str, columns: int) -> np.ndarray:
 
 
 def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
-    """Radii: a number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
+    """A number, as an array of size 1, or an array of shape (size,) and type `dtype`."""
     if isinstance(array, (int, float, np.number)) and not isinstance(array, bool):
-        return check_radii(_single(array, dtype), name)
+        return _single(array, dtype)
     given = hasattr(array, "dtype")
     if not given:
         array = plain_numbers(array, name)
@@ -153,12 +153,24 @@ def vector(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
     if array.dtype.kind not in "fiu":
         raise InvalidArgument(f"{name} has dtype {array.dtype}; it must be an array of numbers")
     if array.ndim == 0:
-        return check_radii(_single(array, dtype), name)
+        return _single(array, dtype)
     if array.shape != (size,):
         raise InvalidArgument(f"{name} has shape {array.shape}; it must be a number or ({size},)")
     array = floats(array, name, dtype if given else None).astype(dtype, copy=False)
     # One value for all and one value for one row are the same.
-    return check_radii(array, name) if size else np.ones(1, dtype)
+    return array if size else np.ones(1, dtype)
+
+
+def vectors(value: Any, name: str, size: int, dtype: Any) -> np.ndarray:
+    """Three numbers, as an array of shape (1, 3), or numbers of shape (size, 3), converted to `dtype`."""
+    array = converted(value, name, dtype)
+    if array.shape == (3,):
+        return array[np.newaxis]
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InvalidArgument(f"{name} has shape {array.shape}; it must be three numbers or ({size}, 3)")
+    if array.shape[0] not in (1, size):
+        raise InvalidArgument(f"{name} has {array.shape[0]} rows; it must have 1 or {size}")
+    return array
 
 
 def check_square(distance: float, what: str, dtype: Any) -> None:
@@ -171,9 +183,10 @@ def check_square(distance: float, what: str, dtype: Any) -> None:
                               f"{np.dtype(dtype)}; use a unit of length in which distances are in [{low:.2g}, {high:.2g}]")
 
 
-def check_radii(radii: np.ndarray, name: str) -> np.ndarray:
-    """Raises as check_square() for the sum of two radii. Leaves invalid radii to the search, which names
-    the first one. @returns the radii"""
+def radii_of(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
+    """As vector(), for a search. Raises as check_square() for the sum of two radii. Leaves invalid radii
+    to the search, which names the first one."""
+    radii = vector(array, name, size, dtype)
     low, high = float(radii.min()), float(radii.max())
     if not (0 < low and high < np.inf):
         return radii

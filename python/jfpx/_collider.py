@@ -435,7 +435,7 @@ class _Search:
         self._positions = _arrays.rows(positions, "positions", 3, dtype)
         self.dtype = self._positions.dtype
         size = self._positions.shape[0]
-        self._radii = _arrays.vector(radii, "radii", size, self.dtype)
+        self._radii = _arrays.radii_of(radii, "radii", size, self.dtype)
         self._batch = None if batch is None else _arrays.offsets(batch, "batch", size)
         self._query: Any = None
         self.periodic = False
@@ -448,7 +448,7 @@ class _Search:
         if self._batch is not None:
             raise InvalidArgument("query and batch exclude each other")
         self._query = _arrays.rows(query, "query", 3, self.dtype)
-        self._query_radii = _arrays.vector(radii, "query_radii", self._query.shape[0], self.dtype)
+        self._query_radii = _arrays.radii_of(radii, "query_radii", self._query.shape[0], self.dtype)
 
     def set_cutoff(self, cutoff: Any) -> float:
         """Sets and returns the radius of which the double is exactly the cutoff."""

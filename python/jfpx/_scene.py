@@ -23,7 +23,8 @@ class Scene:
             {"shape": {"type": "sphere", "radius": 0.5}, "position": [0, 2, 0], "mass": 1},
         ]})
 
-    to_dict() of a scene shows all fields with their defaults.
+    to_dict() of a scene shows all fields with their defaults. Gravity is the `acceleration` of each
+    body, (0, -9.81, 0) m/s^2 by default.
 
     Parameters
     ----------
@@ -118,7 +119,8 @@ class Scene:
         return self
 
     def add_spheres(self, positions: Any, radii: Any, *, masses: Any = 1.0,
-                    velocities: Any = (0.0, 0.0, 0.0)) -> None:
+                    velocities: Any = (0.0, 0.0, 0.0), acceleration: Any = (0.0, -9.81, 0.0),
+                    friction: Any = 0.5, restitution: Any = 0.0) -> None:
         """Adds a movable sphere for each row of an array; nothing if one of them is invalid.
 
         Lists and arrays of other numbers are converted to the dtype of the scene.
@@ -133,6 +135,12 @@ class Scene:
             [kg], finite and >= 0; 0: immovable.
         velocities : three numbers or array (N, 3)
             [m/s], finite.
+        acceleration : three numbers or array (N, 3)
+            [m/s^2], finite: gravity.
+        friction : number or array (N,)
+            Friction coefficient, finite and >= 0.
+        restitution : number or array (N,)
+            Coefficient of restitution, in [0, 1].
 
         Raises
         ------
@@ -141,19 +149,16 @@ class Scene:
         InvalidScene
             A value is out of its range. The message has the body.
         """
-        positions, radii, masses, speeds = (
-            _arrays.converted(array, name, self._dtype)
-            for array, name in ((positions, "positions"), (radii, "radii"), (masses, "masses"),
-                                (velocities, "velocities")))
-        positions = _arrays.rows(positions, "positions", 3)
+        positions = _arrays.rows(_arrays.converted(positions, "positions", self._dtype), "positions", 3)
         size = positions.shape[0]
-        if speeds.ndim == 1:
-            speeds = np.array([_arrays.triple(speeds, "velocities")], self._dtype)
-        speeds = _arrays.rows(speeds, "velocities", 3)
-        if speeds.shape[0] not in (1, size):
-            raise InvalidArgument(f"velocities has {speeds.shape[0]} rows; it must have 1 or {size}")
-        self._scene.add_spheres(positions, _arrays.vector(radii, "radii", size, self._dtype),
-                                _arrays.vector(masses, "masses", size, self._dtype), speeds)
+        radii, masses, friction, restitution = (
+            _arrays.vector(_arrays.converted(values, name, self._dtype), name, size, self._dtype)
+            for values, name in ((radii, "radii"), (masses, "masses"), (friction, "friction"),
+                                 (restitution, "restitution")))
+        velocities, acceleration = (
+            _arrays.vectors(values, name, size, self._dtype)
+            for values, name in ((velocities, "velocities"), (acceleration, "acceleration")))
+        self._scene.add_spheres(positions, radii, masses, velocities, acceleration, friction, restitution)
 
     def add_triangle_mesh(self, vertices: Any, triangles: Any = None, *, two_sided: bool = False,
                           **body: Any) -> dict[str, int]:
@@ -266,6 +271,15 @@ class Scene:
                      dtype=self._dtype)._scene
 
     @property
+    def gravity(self) -> Any:
+        """Raises AttributeError, also if it is set: each body has its own `acceleration`."""
+        raise no_gravity()
+
+    @gravity.setter
+    def gravity(self, value: Any) -> None:
+        raise no_gravity()
+
+    @property
     def dtype(self) -> np.dtype:
         """Precision of a world that is made from the scene: float32 or float64."""
         return self._dtype
@@ -314,6 +328,13 @@ class Scene:
 
 def _from_json(text: str, dtype: str) -> Scene:
     return Scene.from_json(text, dtype=dtype)
+
+
+def no_gravity() -> AttributeError:
+    """The exception of Scene.gravity and World.gravity."""
+    return AttributeError("there is no gravity of all bodies: each has its own acceleration, (0, -9.81, 0) by "
+                          "default; see the field \"acceleration\" of a body, add_spheres(acceleration=...) "
+                          "and World.set_acceleration()")
 
 
 def _to_json(value: Any) -> Any:

@@ -13,7 +13,7 @@ from . import _arrays, _device
 from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._joints import JointId, JointState, arguments, joint_of
-from ._scene import Scene
+from ._scene import Scene, no_gravity
 
 
 class StepReport(NamedTuple):
@@ -473,6 +473,17 @@ class World:
             raise InvalidArgument(f"the scene has dtype {scene.dtype}; the world has {self._dtype}")
         return [BodyId(*body) for body in self._core.add(scene._scene)]
 
+    def add_spheres(self, positions: Any, radii: Any, *, masses: Any = 1.0,
+                    velocities: Any = (0.0, 0.0, 0.0), acceleration: Any = (0.0, -9.81, 0.0),
+                    friction: Any = 0.5, restitution: Any = 0.0) -> list[BodyId]:
+        """Adds a movable sphere for each row of an array, and returns their ids in this order.
+        Parameters and exceptions are those of Scene.add_spheres(). If one of the spheres is invalid,
+        the world is unchanged."""
+        scene = Scene(dtype=self._dtype)
+        scene.add_spheres(positions, radii, masses=masses, velocities=velocities, acceleration=acceleration,
+                          friction=friction, restitution=restitution)
+        return self.add_scene(scene)
+
     def remove(self, body: BodyId) -> None:
         """Removes a body and wakes the bodies in contact with it. contacts() has none until the
         next step. Raises InvalidArgument for an unknown body."""
@@ -628,6 +639,15 @@ class World:
         """Sets the coefficient of restitution of a body, in [0, 1], from the next step on. Raises
         InvalidArgument for an unknown body or a value out of range."""
         self._core.set_restitution(_arrays.body(body), _arrays.number(restitution, "restitution"))
+
+    @property
+    def gravity(self) -> Any:
+        """Raises AttributeError, also if it is set: each body has its own `acceleration`."""
+        raise no_gravity()
+
+    @gravity.setter
+    def gravity(self, value: Any) -> None:
+        raise no_gravity()
 
     def acceleration(self, body: BodyId) -> tuple[float, ...]:
         """Returns the constant acceleration of a body [m/s^2], three numbers; gravity by default.

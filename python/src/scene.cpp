@@ -21,10 +21,15 @@ void bind_scene(nb::module_& module) {
           nb::arg("name"), nb::arg("spheres").none(), nb::arg("boxes").none(), nb::arg("seed"))
       .def("add_spheres",
            [](Scene& self, const Rows<const Real>& positions, const Vector<const Real>& radii,
-              const Vector<const Real>& masses, const Rows<const Real>& velocities) {
+              const Vector<const Real>& masses, const Rows<const Real>& velocities,
+              const Rows<const Real>& acceleration, const Vector<const Real>& friction,
+              const Vector<const Real>& restitution) {
              const std::size_t n = positions.shape(0);
              const auto at = [](const Vector<const Real>& values, std::size_t i) {
                return values(values.shape(0) == 1 ? 0 : i);
+             };
+             const auto row_at = [](const Rows<const Real>& rows, std::size_t i) {
+               return vec3_at(rows, rows.shape(0) == 1 ? 0 : i);
              };
              Scene grown = self;
              grown.bodies.reserve(grown.bodies.size() + n);
@@ -33,7 +38,10 @@ void bind_scene(nb::module_& module) {
                body.shape = Sphere{at(radii, i)};
                body.mass = at(masses, i);
                body.position = vec3_at(positions, i);
-               body.velocity = vec3_at(velocities, velocities.shape(0) == 1 ? 0 : i);
+               body.velocity = row_at(velocities, i);
+               body.acceleration = row_at(acceleration, i);
+               body.friction = at(friction, i);
+               body.restitution = at(restitution, i);
                grown.bodies.push_back(body);
              }
              validate(grown);

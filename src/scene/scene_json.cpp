@@ -148,7 +148,9 @@ class ObjectReader {
       if (known_.contains(item.key())) continue;
       std::string names;
       for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-      fail(where_, "has an unknown field \"" + item.key() + "\"; known fields are " + names);
+      const char* const hint =
+          item.key() == "gravity" ? "; gravity is the field \"acceleration\" of each body" : "";
+      fail(where_, "has an unknown field \"" + item.key() + "\"; known fields are " + names + hint);
     }
   }
 

@@ -119,6 +119,41 @@ def test_spheres_of_arrays_become_bodies(rng, dtype):
     assert [b["shape"]["radius"] for b in scene.to_dict()["bodies"]] == pytest.approx(radii.tolist())
 
 
+def test_spheres_of_arrays_have_their_properties(rng, dtype):
+    positions = (rng.random((20, 3)) * 50).astype(dtype)
+    acceleration = rng.normal(size=(20, 3)).astype(dtype)
+    friction, restitution = rng.random((2, 20)).astype(dtype)
+    masses = np.full(20, 1e-25)  # small, but not a radius of a search
+    world = jfpx.World({"bodies": [BALL]}, dtype=dtype)
+    bodies = world.add_spheres(positions, 0.1, masses=masses, acceleration=acceleration,
+                               friction=friction, restitution=restitution)
+    assert world.bodies[1:] == bodies
+    np.testing.assert_array_equal(world.positions[1:], positions)
+    np.testing.assert_array_equal([world.acceleration(body) for body in bodies], acceleration)
+    np.testing.assert_array_equal([world.friction(body) for body in bodies], friction)
+    np.testing.assert_array_equal([world.restitution(body) for body in bodies], restitution)
+    np.testing.assert_allclose([world.mass(body) for body in bodies], masses, 1e-6)
+    scene = jfpx.Scene(dtype=dtype)
+    scene.add_spheres(positions, 0.1, acceleration=(0, 0, -1), friction=0.25, restitution=1)
+    scene.add_spheres(positions[:1] + 99, 0.1)
+    *others, last = scene.to_dict()["bodies"]
+    for body in others:
+        assert (body["acceleration"], body["friction"], body["restitution"]) == ([0, 0, -1], 0.25, 1)
+    default = jfpx.Scene({"bodies": [BALL]}).to_dict()["bodies"][0]
+    for field in ("acceleration", "friction", "restitution"):
+        assert last[field] == pytest.approx(default[field])
+
+
+@pytest.mark.parametrize("make", [jfpx.Scene, lambda: jfpx.World({"bodies": [BALL]})])
+def test_gravity_is_the_acceleration_of_a_body(make):
+    made = make()
+    assert not hasattr(made, "gravity")
+    with pytest.raises(AttributeError, match="each has its own acceleration"):
+        made.gravity
+    with pytest.raises(AttributeError, match="each has its own acceleration"):
+        made.gravity = (0, 0, -9.81)
+
+
 def test_lists_and_arrays_of_other_types_are_converted_to_the_dtype(dtype):
     other = {"float32": np.float64, "float64": np.float32}[dtype.name]
     scenes = []
@@ -604,6 +639,16 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: jfpx.Scene().add_spheres(np.zeros((3, 3), np.float32), 1,
                                         velocities=np.zeros((2, 3), np.float32)),
      jfpx.InvalidArgument, "velocities has 2 rows"),
+    (lambda w: w.add_spheres([[0, 9, 0]], 1, acceleration=[0, 1]), jfpx.InvalidArgument,
+     r"acceleration has shape \(2,\); it must be three numbers or \(1, 3\)"),
+    (lambda w: w.add_spheres([[0, 9, 0]], 1, acceleration=[[0, 1, 0]] * 2), jfpx.InvalidArgument,
+     "acceleration has 2 rows; it must have 1 or 1"),
+    (lambda w: w.add_spheres([[0, 9, 0]], 1, friction=[0, 1]), jfpx.InvalidArgument, "friction has shape"),
+    (lambda w: w.add_spheres([[0, 9, 0]], 1, friction="ice"), jfpx.InvalidArgument, "friction is not an array"),
+    (lambda w: w.add_spheres([[0, 9, 0], [9, 9, 9]], 1, restitution=[0, 2]), jfpx.InvalidScene,
+     r"body 1.*restitution"),
+    (lambda w: jfpx.Scene({"gravity": [0, 0, -9.81]}), jfpx.InvalidScene,
+     'unknown field "gravity".*gravity is the field "acceleration" of each body'),
     (lambda w: jfpx.World(3), jfpx.InvalidArgument, "scene is int"),
     (lambda w: jfpx.World(pathlib.Path("a.json")), jfpx.InvalidArgument, r"Scene.load\(\) reads a file"),
     (lambda w: jfpx.World(w.scene, dtype="float64"), jfpx.InvalidArgument, "dtype is float64"),
