@@ -21,4 +21,5 @@
 #include <jfpx/scene.hpp>
 #include <jfpx/snapshot.hpp>
 #include <jfpx/sphere_collider.hpp>
+#include <jfpx/trajectory.hpp>
 #include <jfpx/world.hpp>

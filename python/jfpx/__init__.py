@@ -15,7 +15,7 @@ from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Exp
                       ForceContext, Gravity, Spring, States)
 from ._joints import (BallJoint, DistanceJoint, FixedJoint, HingeJoint, JointId, JointState,
                       SliderJoint, WheelJoint)
-from ._recording import Recording, RecordingWriter
+from ._recording import Recording, RecordingWriter, TrajectoryWriter
 from ._scene import Scene, scene_names
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
                      WorldContacts)
@@ -30,6 +30,6 @@ __all__ = [
     "InvalidSnapshot", "JointId", "JointState", "OutOfMemory", "PeriodicContactRows",
     "PeriodicContacts", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
     "RecordingWriter", "Rows", "STAY", "Scene", "SliderJoint", "SphereCollider", "Spring",
-    "States", "StepReport", "WheelJoint", "World", "WorldContacts", "available_backends",
+    "States", "StepReport", "TrajectoryWriter", "WheelJoint", "World", "WorldContacts", "available_backends",
     "find_contacts", "find_pairs", "scene_names",
 ]

@@ -1,8 +1,9 @@
-"""Recordings of runs: the scene and the states after every step."""
+"""Files of runs: recordings, which can be repeated, and trajectories for other programs."""
 
 from __future__ import annotations
 
 import os
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,8 +13,30 @@ from ._forces import States
 from ._scene import Scene
 from ._world import World
 
+_Self = TypeVar("_Self", bound="_FileWriter")
 
-class RecordingWriter:
+
+class _FileWriter:
+    """A file that appears when it is complete."""
+
+    _writer: Any
+
+    def finish(self) -> None:
+        """Completes the file. Raises FileError, and Closed if the file is finished or was given up."""
+        self._writer.finish()
+
+    def __enter__(self: _Self) -> _Self:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is None:
+            if self._writer.is_open():
+                self.finish()
+        else:
+            self._writer.discard()
+
+
+class RecordingWriter(_FileWriter):
     """Writes a recording, which `jfpx replay` and Recording read. The file appears under its name
     when the recording is finished: by finish(), or at the end of a `with` statement that raised
     nothing. Until then, the data are in a file with the suffix .part, which an exception in the
@@ -78,20 +101,63 @@ class RecordingWriter:
         self._writer.append(world._core)
         self._steps += 1
 
-    def finish(self) -> None:
-        """Completes the file. Raises FileError, and Closed if the recording is finished or was
-        given up."""
-        self._writer.finish()
 
-    def __enter__(self) -> RecordingWriter:
-        return self
+class TrajectoryWriter(_FileWriter):
+    """Writes the states of a world to a file for other programs. The extension selects the format:
+    ".xyz" or ".extxyz" is extended XYZ, a text file that OVITO and ASE read; ".pvd" is an index of
+    VTK files for ParaView, one for each frame, in a folder beside it: run.pvd has
+    run/run_000000.vtp and so on. The files appear under their names when the trajectory is finished:
+    by finish(), or at the end of a `with` statement that raised nothing.
 
-    def __exit__(self, kind: object, *_: object) -> None:
-        if kind is None:
-            if self._writer.is_open():
-                self.finish()
-        else:
-            self._writer.discard()
+    ::
+
+        with jfpx.TrajectoryWriter("run.pvd", world) as trajectory:
+            for _ in range(100):
+                trajectory.append()
+                world.run(6)
+
+    A frame has a point for each of World.bodies, with the bits of their states: position, id
+    (BodyId.index), radius, shape, orientation, velocity and angular velocity. Quaternions are (x, y,
+    z, w) in extended XYZ, as in OVITO, and (w, x, y, z) in VTK. The radius of a body that is no
+    sphere is the largest distance of its surface from its position, or a bound of it, and 0 for a
+    half-space or plane. `shape` is 0 for a sphere, 1 box, 2 half-space, 3 plane, 4 compound, 5
+    capsule, 6 triangle mesh, 7 hull, 8 heightfield, 9 cylinder, 10 cone; the geometry of these is
+    not in the file.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    world : World
+        A world, which may be changed between two frames.
+
+    Raises
+    ------
+    InvalidArgument
+        The extension is another one.
+    FileError
+        The file cannot be created.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], world: World) -> None:
+        _arrays.instance(world, "world", World)
+        self._writer = _arrays.precision_of(world.dtype).TrajectoryWriter(_arrays.path(path))
+        self._world = world
+
+    def append(self) -> None:
+        """Appends a frame with the states of the world.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written, for example because the disk is full. The trajectory cannot
+            be finished then.
+        Closed
+            The trajectory is finished or was given up, or the world is closed.
+        ConcurrentUse, OutOfMemory, DeviceError
+            As World.states().
+        """
+        self._writer.append(self._world._core)
 
 
 class Recording:

@@ -1,5 +1,6 @@
-/// Binding of recordings.
+/// Binding of recordings and trajectories.
 #include <jfpx/recording.hpp>
+#include <jfpx/trajectory.hpp>
 
 #include "python/src/bindings.hpp"
 #include "python/src/world.hpp"
@@ -9,33 +10,50 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-/// A writer that close() discards with its unfinished file.
+/// A writer that discard() ends with its unfinished file.
+template <class FileWriter>
 struct Writer {
-  std::optional<RecordingWriter> writer;
-  RecordingWriter& get() {
-    if (!writer) throw Closed("the recording is closed");
+  std::optional<FileWriter> writer;
+  FileWriter& get() {
+    if (!writer) throw Closed("the file is finished, or was given up");
     return *writer;
   }
 };
 
-}  // namespace
-
-void bind_recording(nb::module_& module) {
-  nb::class_<Writer>(module, "RecordingWriter")
-      .def("__init__",
-           [](Writer* self, const std::string& path, const PythonWorld& world) {
-             new (self) Writer{RecordingWriter(
-                 path, {.engine = "native", .backend = "cpu", .scene = world.scene()})};
-           })
-      .def("append",
-           [](Writer& self, const PythonWorld& world) { self.get().append(world.get().states()); })
+template <class FileWriter>
+nb::class_<Writer<FileWriter>> bind_writer(nb::module_& module, const char* name) {
+  using Self = Writer<FileWriter>;
+  return nb::class_<Self>(module, name)
       .def("finish",
-           [](Writer& self) {
+           [](Self& self) {
              self.get().finish();
              self.writer.reset();
            })
-      .def("is_open", [](const Writer& self) { return self.writer.has_value(); })
-      .def("discard", [](Writer& self) { self.writer.reset(); });
+      .def("is_open", [](const Self& self) { return self.writer.has_value(); })
+      .def("discard", [](Self& self) { self.writer.reset(); });
+}
+
+}  // namespace
+
+void bind_recording(nb::module_& module) {
+  using Recording = Writer<RecordingWriter>;
+  bind_writer<RecordingWriter>(module, "RecordingWriter")
+      .def("__init__",
+           [](Recording* self, const std::string& path, const PythonWorld& world) {
+             new (self) Recording{RecordingWriter(
+                 path, {.engine = "native", .backend = "cpu", .scene = world.scene()})};
+           })
+      .def("append", [](Recording& self, const PythonWorld& world) {
+        self.get().append(world.get().states());
+      });
+  using Trajectory = Writer<TrajectoryWriter>;
+  bind_writer<TrajectoryWriter>(module, "TrajectoryWriter")
+      .def("__init__",
+           [](Trajectory* self, const std::string& path) {
+             new (self) Trajectory{TrajectoryWriter(path)};
+           })
+      .def("append",
+           [](Trajectory& self, const PythonWorld& world) { self.get().append(world.get()); });
 
   nb::class_<RecordingReader>(module, "RecordingReader")
       .def(nb::init<const std::string&>())

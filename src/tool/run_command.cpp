@@ -1,6 +1,7 @@
 /// jfpx run: runs a scene with one engine.
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
+#include <jfpx/trajectory.hpp>
 
 #include "src/base/atomic_file.hpp"
 #include "src/tool/commands.hpp"
@@ -27,8 +28,10 @@ namespace {
 struct CommandOptions {
   RunOptions run;
   std::string engine = "native";
-  std::string input;     ///< path of an input script
-  std::string snapshot;  ///< path
+  std::string input;                   ///< path of an input script
+  std::string snapshot;                ///< path
+  std::string trajectory;              ///< path
+  std::uint64_t trajectory_every = 1;  ///< [steps], > 0
 };
 
 struct Totals {
@@ -105,6 +108,9 @@ std::unique_ptr<Engine> start(const CommandOptions& options, Scene* scene) {
   if (!options.snapshot.empty()) {
     throw InvalidArgument("--snapshot requires a scene; the controls of a demo are not in it");
   }
+  if (!options.trajectory.empty()) {
+    throw InvalidArgument("--trajectory requires a scene; the bodies of a demo change");
+  }
   return make_demo_engine(options.run, options.input, scene);
 }
 
@@ -119,6 +125,11 @@ int run(const CommandOptions& options) {
                       RecordingHeader{.engine = options.engine,
                                       .backend = std::string(to_string(options.run.backend)),
                                       .scene = scene});
+  }
+  std::optional<TrajectoryWriter> trajectory;
+  if (!options.trajectory.empty()) {
+    trajectory.emplace(options.trajectory);
+    trajectory->append(scene, 0, engine->states());
   }
   std::optional<AtomicFile> snapshot;
   if (!options.snapshot.empty()) snapshot.emplace(options.snapshot);
@@ -135,10 +146,14 @@ int run(const CommandOptions& options) {
       ++totals.choices[engine->choice()];
       if (csv) csv.write(csv_row(step, *engine));
       if (recording) recording->append(engine->states());
+      if (trajectory && step % options.trajectory_every == 0) {
+        trajectory->append(scene, step, engine->states());
+      }
       progress.advance_to(step);
     }
   }
   if (recording) recording->finish();
+  if (trajectory) trajectory->finish();
   if (snapshot) {
     const std::vector<std::byte> bytes = engine->world()->snapshot().bytes;
     snapshot->write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
@@ -190,8 +205,22 @@ void add_run_command(CLI::App& app, int& status) {
   command->add_option("--snapshot", options->snapshot,
                       "Native engine: write the state after the last step to this file (see: jfpx "
                       "replay --from)");
+  CLI::Option* const trajectory =
+      command->add_option("--trajectory", options->trajectory,
+                          "Write the bodies at the start and after every step to this file, for "
+                          "other programs: .xyz or "
+                          ".extxyz (extended XYZ: OVITO, ASE), .pvd (VTK: ParaView)");
+  command
+      ->add_option("--trajectory-every", options->trajectory_every,
+                   "Number of steps from a frame of --trajectory to the next")
+      ->check(whole_number())
+      ->capture_default_str()
+      ->needs(trajectory);
   command->callback([command, options, &status] {
     check_engine(*command, *options);
+    if (options->trajectory_every == 0) {
+      throw InvalidArgument("--trajectory-every is 0; it must be at least 1");
+    }
     status = run(*options);
   });
 }

@@ -23,6 +23,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_calls.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recording.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/recording/trajectory.cpp
   ${CMAKE_CURRENT_LIST_DIR}/snapshots/body_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/snapshots/contact_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/snapshots/force_snapshot.cpp

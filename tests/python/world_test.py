@@ -437,6 +437,82 @@ def test_a_recording_of_a_failed_run_leaves_no_file(tmp_path):
         writer.append()
 
 
+def read_xyz(path):
+    """The line of properties and the rows of each frame."""
+    lines = iter(path.read_text().splitlines())
+    for count in lines:
+        yield next(lines), [next(lines).removeprefix("X ").split() for _ in range(int(count))]
+
+
+def test_a_trajectory_has_the_states_of_the_run(tmp_path, dtype):
+    world = jfpx.World(jfpx.Scene.named("mixed", spheres=20, dtype=dtype))
+    path, frames = tmp_path / "run.xyz", []
+    with jfpx.TrajectoryWriter(path, world) as trajectory:
+        for _ in range(3):
+            trajectory.append()
+            frames.append((world.time, [body.index for body in world.bodies], world.states()))
+            world.run(5)
+            world.remove(world.bodies[-2])
+        assert not path.exists()
+    read = list(read_xyz(path))
+    assert len(read) == 3
+    for (properties, rows), (moment, ids, states) in zip(read, frames):
+        assert float(properties.partition(" Time=")[2].split()[0]) == moment
+        columns = np.array(rows).astype(dtype)
+        np.testing.assert_array_equal(columns[:, 3], ids)
+        np.testing.assert_array_equal(columns[:, :3], states.positions)
+        np.testing.assert_array_equal(columns[:, [9, 6, 7, 8]], states.orientations)
+        np.testing.assert_array_equal(columns[:, 10:13], states.velocities)
+        np.testing.assert_array_equal(columns[:, 13:], states.angular_velocities)
+
+
+def test_a_trajectory_of_a_failed_run_leaves_no_file(tmp_path):
+    world = jfpx.World({"bodies": [BALL]})
+    for name in ("run.xyz", "run.pvd"):
+        with pytest.raises(LookupError):
+            with jfpx.TrajectoryWriter(tmp_path / name, world) as trajectory:
+                trajectory.append()
+                raise LookupError
+        assert list(tmp_path.iterdir()) == []
+        with pytest.raises(jfpx.Closed):
+            trajectory.append()
+
+
+def test_other_libraries_read_trajectories(tmp_path, dtype):
+    ase = pytest.importorskip("ase.io")
+    vtk = pytest.importorskip("vtk")
+    from vtk.util.numpy_support import vtk_to_numpy
+    world = jfpx.World(jfpx.Scene.named("mixed", spheres=20, dtype=dtype))
+    with jfpx.TrajectoryWriter(tmp_path / "run.extxyz", world) as text, \
+            jfpx.TrajectoryWriter(tmp_path / "run.pvd", world) as binary:
+        for _ in range(2):
+            world.run(30)
+            text.append()
+            binary.append()
+    states = world.states()
+    ids = [body.index for body in world.bodies]
+    atoms = ase.read(tmp_path / "run.extxyz", index=":")
+    assert len(atoms) == 2 and atoms[1].info["Time"] == world.time and atoms[1].info["Step"] == 60
+    np.testing.assert_array_equal(atoms[1].positions.astype(dtype), states.positions)
+    np.testing.assert_array_equal(atoms[1].arrays["id"], ids)
+    np.testing.assert_array_equal(np.roll(atoms[1].arrays["orientation"].astype(dtype), 1, 1),
+                                  states.orientations)
+    reader = vtk.vtkXMLPolyDataReader()
+    reader.SetFileName(str(tmp_path / "run" / "run_000001.vtp"))
+    reader.Update()
+    points = reader.GetOutput()
+    assert points.GetNumberOfVerts() == len(world)
+    assert vtk_to_numpy(points.GetFieldData().GetArray("TimeValue")) == world.time
+    values = {name: vtk_to_numpy(points.GetPointData().GetArray(name))
+              for name in ("id", "radius", "orientation", "velocity", "angular_velocity")}
+    values["position"] = vtk_to_numpy(points.GetPoints().GetData())
+    np.testing.assert_array_equal(values["id"], ids)
+    np.testing.assert_array_equal(values["radius"].astype(dtype), atoms[1].arrays["radius"].astype(dtype))
+    for name, expected in zip(("position", "orientation", "velocity", "angular_velocity"), states):
+        assert values[name].dtype == dtype
+        np.testing.assert_array_equal(values[name], expected)
+
+
 def test_a_recording_that_could_not_be_repeated_is_refused(tmp_path):
     path = tmp_path / "run.rec"
     world = jfpx.World({"bodies": [BALL]})
@@ -649,6 +725,10 @@ def test_a_world_and_its_forces_are_collected():
      r"body 1.*restitution"),
     (lambda w: jfpx.Scene({"gravity": [0, 0, -9.81]}), jfpx.InvalidScene,
      'unknown field "gravity".*gravity is the field "acceleration" of each body'),
+    (lambda w: jfpx.TrajectoryWriter("run.dump", w), jfpx.InvalidArgument,
+     r'run.dump has the extension ".dump"; it must be .xyz'),
+    (lambda w: jfpx.TrajectoryWriter("/nowhere/run.pvd", w), jfpx.FileError, "/nowhere/run.pvd: can't be written"),
+    (lambda w: jfpx.TrajectoryWriter("run.xyz", 3), jfpx.InvalidArgument, "world is 3; it must be a World"),
     (lambda w: jfpx.World(3), jfpx.InvalidArgument, "scene is int"),
     (lambda w: jfpx.World(pathlib.Path("a.json")), jfpx.InvalidArgument, r"Scene.load\(\) reads a file"),
     (lambda w: jfpx.World(w.scene, dtype="float64"), jfpx.InvalidArgument, "dtype is float64"),
@@ -751,7 +831,7 @@ def test_the_code_of_the_guide_runs(tmp_path, monkeypatch):
     names = run_code_of("docs/python.md")
     assert names["pairs"].shape[1] == names["size"] == names["contacts"].pairs.shape[1] > 0
     assert names["report"].step == 120 and len(names["recording"]) == 10
-    assert np.isfinite(names["trajectory"]).all()
+    assert np.isfinite(names["frames"]).all()
 
 
 def square_mesh(size=4):

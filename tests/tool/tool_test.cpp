@@ -96,6 +96,12 @@ TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("run pile --resolver best-first", 2, "best-first");
   expect_fails("run pile --substeps 0", 2, "substeps is 0");
   expect_fails("run pile --substeps 65", 2, "substeps is 65");
+  expect_fails("run pile --trajectory run.dump", 2, "has the extension \".dump\"");
+  expect_fails("run pile --trajectory /nowhere/run.pvd", 2, "/nowhere/run.pvd: can't be written");
+  expect_fails("run pile --trajectory-every 2", 2, "--trajectory-every requires --trajectory");
+  expect_fails("run pile --trajectory run.xyz --trajectory-every 0", 2,
+               "--trajectory-every is 0; it must be at least 1");
+  expect_fails("run flight --trajectory run.xyz", 2, "--trajectory requires a scene");
   expect_fails("scenes --export", 2, "SCENE");
   expect_fails("scenes --spheres 5", 2, "SCENE");
 }
@@ -132,6 +138,28 @@ TEST(Tool, OutputThatIsLostIsAnError) {
   const test::TemporaryFolder folder;
   std::filesystem::create_symlink("/dev/full", folder.file("full"));
   expect_fails("run pile --steps 1 --csv " + folder.file("full"), 2, "can't be written: No space");
+  std::filesystem::create_symlink("/dev/full", folder.file("full.xyz"));
+  expect_fails("run pile --steps 1 --trajectory " + folder.file("full.xyz"), 2,
+               "full.xyz: can't be written: No space");
+}
+
+TEST(Tool, ATrajectoryHasTheFramesThatAreSelected) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("run.xyz");
+  for (const std::string& engine : {std::string("native"), std::string("bullet-stock")}) {
+    if (!JFPX_HAS_BULLET && engine != "native") continue;
+    const ProcessResult result =
+        jfpx_command("run pile --spheres 5 --steps 10 --quiet --trajectory-every 4 --trajectory " +
+                     path + " --engine " + engine);
+    EXPECT_EQ(result.status, 0) << result.output;
+    std::ifstream file(path);
+    std::string steps;
+    for (std::string line; std::getline(file, line);) {
+      const std::size_t at = line.find(" Step=");
+      if (at != std::string::npos) steps += line.substr(at, line.find(' ', at + 1) - at);
+    }
+    EXPECT_EQ(steps, " Step=0 Step=4 Step=8") << engine;
+  }
 }
 
 TEST(Tool, ResultsGoThroughLinksToDevices) {
@@ -197,7 +225,8 @@ TEST(Tool, AnInterruptedRunLeavesNoFiles) {
     const ProcessResult result = test::run_process(
         "timeout --foreground --preserve-status -s " + std::string(signal) +
         " 0.5 " JFPX_TOOL_PATH " run pile --spheres 50 --steps 100000000 --quiet --record " +
-        folder.file("run.rec") + " --csv " + folder.file("run.csv"));
+        folder.file("run.rec") + " --csv " + folder.file("run.csv") + " --trajectory " +
+        folder.file("run.pvd") + " --trajectory-every 1000");
     EXPECT_EQ(result.status, status) << "ends by the signal";
     EXPECT_EQ(folder.entries(), 0u) << signal;
   }
