@@ -56,6 +56,50 @@ case $step in
       said "cuda off (no CUDA compiler was found that works" || fail "$(cat "$work/log")"
     done
     ;;
+  # What is missing is named, with its package.
+  missing)
+    common=(-S "$root" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF -DJFPX_BENCH=ON)
+    while read -r name packages; do
+      refuses "$name" "${common[@]}" -DCMAKE_DISABLE_FIND_PACKAGE_"${name%% *}"=ON
+      said "or newer was not found" && said "sudo apt install $packages, or scripts/setup" ||
+        fail "the package of $name is not named: $(cat "$work/log")"
+      rm -r "$work/build"
+    done <<'END'
+nlohmann_json nlohmann-json3-dev
+CLI11 libcli11-dev
+fmt libfmt-dev
+GTest libgtest-dev libgmock-dev
+benchmark libbenchmark-dev
+END
+    printf '#!/bin/sh\nexec g++ -w -U__GNUC__ -D__GNUC__=11 "$@"\n' >"$work/g++-11"
+    chmod +x "$work/g++-11"
+    CXX=$work/g++-11 refuses "is GNU 11" "${common[@]}"
+    said "jfpx needs g++ 12, clang 14 or newer. On Debian and Ubuntu: sudo apt install g++-12" || fail "$(cat "$work/log")"
+    rm -r "$work/build"
+    mkdir "$work/bin"
+    ln -s "$(command -v cmake)" "$(command -v ninja)" "$work/bin"
+    if (unset CXX; PATH=$work/bin cmake -B "$work/build" -G Ninja "${common[@]}" >"$work/log" 2>&1); then
+      fail "accepted: no compiler"
+    fi
+    said "No C++ compiler was found on PATH" && said "sudo apt install g++." || fail "$(cat "$work/log")"
+    ;;
+  # pip compiles for the GPUs of the machine, where nvcc supports them.
+  gpu)
+    command -v nvcc >/dev/null || { echo "skipped: there is no nvcc"; exit 0; }
+    while read -r expected capabilities; do
+      printf '#!/bin/sh\nprintf "%s"\n' "$capabilities" >"$work/nvidia-smi"
+      chmod +x "$work/nvidia-smi"
+      PATH=$work:$PATH accepts -S "$root" -DSKBUILD=2 -DJFPX_CUDA=ON -DJFPX_VIEWER=OFF -DJFPX_TESTS=OFF
+      said "architectures $(tr _ ' ' <<<"$expected"), minutes less" || fail "no $expected in: $(cat "$work/log")"
+      rm -r "$work/build"
+    done <<'END'
+89-real 8.9\n
+75-real,_90-real 7.5\n9.0\n9.0\n
+75-virtual,_90 7.0\n
+75-virtual,_90 9.0\n99.9\n
+75-virtual,_90 no device
+END
+    ;;
   # One precision compiles nothing of the other.
   precisions)
     list() { ninja -C "$work/build" -t commands all | grep -oE ' -o [^ ]+[.]dir/[^ ]+[.]o ' >"$work/objects"; }
