@@ -13,6 +13,7 @@
 #include <jfpx/hull.hpp>
 #include <jfpx/joint.hpp>
 #include <jfpx/material.hpp>
+#include <jfpx/nearest.hpp>
 #include <jfpx/periodic.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>

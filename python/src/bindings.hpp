@@ -127,6 +127,7 @@ SphereColliderOptions collider_options(const std::string& backend, const std::st
                                        unsigned threads, int device);
 
 void bind_collider(nb::module_& module);
+void bind_nearest(nb::module_& module);
 /// Only with the CUDA backend.
 void bind_device_collider(nb::module_& module);
 void bind_scene(nb::module_& module);

@@ -57,9 +57,9 @@ JFPX_HD inline double sum_with_error(double x, double y, double* error) {
   *error += (x - (sum - of_y)) + (y - of_y);
   return sum;
 }
-/// a - (b + shift * length), as if it were rounded once, apart from errors of 2^-100 of the terms.
-JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real length) {
-  if (shift == 0) return a - b;
+/// a - (b + shift * length) in double, as if it were rounded once, apart from errors of 2^-100 of
+/// the terms.
+JFPX_HD inline double exact_image_difference(Real a, Real b, std::int32_t shift, Real length) {
   // Both products are exact: the upper part of the length has 27 bits, and a shift has at most 22
   // (Dekker 1971).
   const double product = static_cast<double>(length) * ((1 << 26) + 1);
@@ -69,7 +69,12 @@ JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real le
   sum = sum_with_error(sum, -static_cast<double>(shift) * upper, &error);
   sum = sum_with_error(sum, -static_cast<double>(shift) * (static_cast<double>(length) - upper),
                        &error);
-  return static_cast<Real>(sum + error);
+  return sum + error;
+}
+/// The same, rounded to Real.
+JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real length) {
+  if (shift == 0) return a - b;
+  return static_cast<Real>(exact_image_difference(a, b, shift, length));
 }
 
 /// Reduces one coordinate to about [-length/2, length/2), and returns the number of cells that it

@@ -11,6 +11,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cpu/contact_writer.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_baseline.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_scalar.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/nearest.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/sphere_collider_cpu.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/all_pairs.cu
