@@ -142,6 +142,7 @@ TEST(Tool, OutputThatIsLostIsAnError) {
   expect_fails("run pile --steps 1 --trajectory " + folder.file("full.xyz"), 2,
                "full.xyz: can't be written: No space");
 }
+#endif
 
 TEST(Tool, ATrajectoryHasTheFramesThatAreSelected) {
   const test::TemporaryFolder folder;
@@ -162,6 +163,7 @@ TEST(Tool, ATrajectoryHasTheFramesThatAreSelected) {
   }
 }
 
+#if !defined(_WIN32)
 TEST(Tool, ResultsGoThroughLinksToDevices) {
   const test::TemporaryFolder folder;
   const std::string link = folder.file("link");

@@ -10,15 +10,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
 #if !defined(_WIN32)
+#include "tests/support/full_disk.hpp"
+
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #endif
@@ -97,19 +97,15 @@ TEST(Recording, IsFinishedOnce) {
   EXPECT_EQ(RecordingReader(path).steps(), 1u);
 }
 
-#if !defined(_WIN32)  // has no limit of the size of a file
+#if !defined(_WIN32)
 TEST(Recording, IsNotFinishedAfterAFailedWrite) {
   const test::TemporaryFolder folder;
   const std::string full = folder.file("full.rec");
   RecordingWriter unlucky(full, header_of(1000));
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{.rlim_cur = 10'000, .rlim_max = before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-  EXPECT_THROW(for (int i = 0; i < 100; ++i) unlucky.append(random_states(1000, 1)), FileError);
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-  std::signal(SIGXFSZ, old_handler);
+  {
+    const test::FullDisk disk;
+    EXPECT_THROW(for (int i = 0; i < 100; ++i) unlucky.append(random_states(1000, 1)), FileError);
+  }
   EXPECT_THROW(unlucky.finish(), FileError) << "there is room again, but a frame is cut off";
   EXPECT_FALSE(std::ifstream(full));
 }

@@ -11,11 +11,13 @@
 #include <gtest/gtest.h>
 
 #include <charconv>
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <sstream>
-#include <sys/resource.h>
+
+#if !defined(_WIN32)
+#include "tests/support/full_disk.hpp"
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -301,20 +303,17 @@ TEST(Trajectory, ErrorsNameTheFile) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
+#if !defined(_WIN32)
 TEST(Trajectory, OnAFullDiskIsAnErrorAndLeavesNoFile) {
   for (const std::string extension : {"xyz", "pvd"}) {
     const TemporaryFolder folder;
     const World world(scenes::make("pile", {.spheres = 1000}));
     {
       TrajectoryWriter writer(folder.file("run." + extension));
-      rlimit before{};
-      ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-      const auto old_handler = std::signal(SIGXFSZ, SIG_IGN);
-      const rlimit small{.rlim_cur = 10'000, .rlim_max = before.rlim_max};
-      ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-      EXPECT_THROW(for (int i = 0; i < 9; ++i) writer.append(world), FileError) << extension;
-      ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-      std::signal(SIGXFSZ, old_handler);
+      {
+        const FullDisk full;
+        EXPECT_THROW(for (int i = 0; i < 9; ++i) writer.append(world), FileError) << extension;
+      }
       EXPECT_THROW(writer.append(world), FileError)
           << "there is room again, but a frame is cut off";
       EXPECT_THROW(writer.finish(), FileError) << extension;
@@ -322,6 +321,7 @@ TEST(Trajectory, OnAFullDiskIsAnErrorAndLeavesNoFile) {
     EXPECT_EQ(folder.entries(), 0u) << extension;
   }
 }
+#endif
 
 }  // namespace
 }  // namespace test

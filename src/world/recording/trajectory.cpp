@@ -5,6 +5,7 @@
 
 #include "src/base/atomic_file.hpp"
 #include "src/base/file.hpp"
+#include "src/base/system.hpp"
 #include "src/scene/compound.hpp"
 
 #include <array>
@@ -178,10 +179,10 @@ class VtkFile {
 /// all are complete.
 struct TrajectoryWriter::Vtk final : Format {
   explicit Vtk(const fs::path& path)
-      : index(path.string()),
-        name(path.stem().string()),
-        folder(path.parent_path() / name),
-        part(folder.string() + ".part") {
+      : index(to_text(path)),
+        name(to_text(path.stem())),
+        folder(path.parent_path() / path.stem()),
+        part(path.parent_path() / to_path(name + ".part")) {
     std::error_code error;
     if (fs::exists(folder) && !fs::is_directory(folder)) fail(folder, ENOTDIR);
     fs::create_directory(part, error);
@@ -205,7 +206,7 @@ struct TrajectoryWriter::Vtk final : Format {
     append_number(&time, frame.time);
     index.write("    <DataSet timestep=\"" + time + "\" file=\"" + xml_text(name + '/' + file) +
                 "\"/>\n");
-    write_frame(frame, time, part / file);
+    write_frame(frame, time, part / to_path(file));
     ++frames;
     failed = false;
   }
@@ -217,8 +218,8 @@ struct TrajectoryWriter::Vtk final : Format {
     fs::create_directory(folder, error);
     if (error) fail(folder, error.value());
     for (std::size_t i = 0; i < frames; ++i) {
-      fs::rename(part / file_name(i), folder / file_name(i), error);
-      if (error) fail(folder / file_name(i), error.value());
+      fs::rename(part / to_path(file_name(i)), folder / to_path(file_name(i)), error);
+      if (error) fail(folder / to_path(file_name(i)), error.value());
     }
     remove_frames(folder, frames);
     fs::remove(part, error);
@@ -232,19 +233,19 @@ struct TrajectoryWriter::Vtk final : Format {
   }
   void remove_frames(const fs::path& from, std::size_t first) const {
     std::error_code ignored;
-    while (fs::remove(from / file_name(first), ignored)) ++first;
+    while (fs::remove(from / to_path(file_name(first)), ignored)) ++first;
   }
   void require_success() const {
-    if (failed) throw FileError(folder.string() + ": an earlier write failed");
+    if (failed) throw FileError(to_text(folder) + ": an earlier write failed");
   }
   [[noreturn]] static void fail(const fs::path& path, int error_number) {
-    throw FileError(file_message(path.string(), "can't be written", error_number));
+    throw FileError(file_message(to_text(path), "can't be written", error_number));
   }
 
   void write_frame(const FrameColumns& frame, const std::string& time, const fs::path& path) {
     const std::size_t n = frame.states.size();
     const std::string points = std::to_string(n);
-    VtkFile file(path.string());
+    VtkFile file(to_text(path));
     file.write(
         "<?xml version=\"1.0\"?>\n"
         "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
@@ -312,13 +313,13 @@ struct TrajectoryWriter::Vtk final : Format {
 };
 
 TrajectoryWriter::TrajectoryWriter(const std::string& path) {
-  const fs::path extension = fs::path(path).extension();
+  const fs::path extension = to_path(path).extension();
   if (extension == ".xyz" || extension == ".extxyz") {
     format_ = std::make_unique<ExtendedXyz>(path);
   } else if (extension == ".pvd") {
-    format_ = std::make_unique<Vtk>(path);
+    format_ = std::make_unique<Vtk>(to_path(path));
   } else {
-    throw InvalidArgument("trajectory " + path + " has the extension \"" + extension.string() +
+    throw InvalidArgument("trajectory " + path + " has the extension \"" + to_text(extension) +
                           "\"; it must be .xyz or .extxyz (extended XYZ), or .pvd (VTK)");
   }
 }
