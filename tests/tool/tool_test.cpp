@@ -615,6 +615,7 @@ TEST(Tool, ReplayContinuesFromASnapshot) {
       EXPECT_THAT(result.output, HasSubstr("20 steps after step 30, engine native: all states"));
     }
   }
+  if (!JFPX_HAS_BULLET) return;
   expect_fails("replay --engine bullet-stock --from " + snapshot + " " + recording, 2,
                "--from requires the native engine; engine is bullet-stock");
 }

@@ -5,6 +5,8 @@
 #include "src/sphere_collider/cpu/point_tree.hpp"
 #include "src/sphere_collider/periodic_input.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <new>
 #include <string>
