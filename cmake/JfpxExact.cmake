@@ -20,8 +20,8 @@ if(MSVC) # clang-cl; programs that link jfpx may be compiled by cl
     message(FATAL_ERROR "The compiler is cl, which has no vector types: build jfpx with clang-cl, which Visual Studio "
       "includes (cmake -T ClangCL). Programs that link jfpx may be compiled by cl.")
   endif()
-  set(JFPX_EXACT_FLAGS $<$<COMPILE_LANGUAGE:CXX>:/fp:precise>
-    $<$<COMPILE_LANG_AND_ID:CXX,MSVC>:/fp:contract-> $<$<COMPILE_LANG_AND_ID:CXX,Clang>:/clang:-ffp-contract=off>)
+  # cl contracts with /fp:precise before Visual Studio 2022 only, and then for AVX2 only.
+  set(JFPX_EXACT_FLAGS $<$<COMPILE_LANGUAGE:CXX>:/fp:precise> $<$<COMPILE_LANG_AND_ID:CXX,Clang>:/clang:-ffp-contract=off>)
   set(JFPX_AVX2_FLAGS /arch:AVX2)
   set(JFPX_AVX512_FLAGS /arch:AVX512)
 endif()

@@ -23,17 +23,18 @@ struct NearestPoints {
 };
 
 struct NearestOptions {
-  /// The nearest image of each point counts; of two images, half a length apart from the query, the
-  /// one with the smaller shift.
+  /// The nearest image of each point counts; of two images, half a length apart from the query
+  /// after rounding to double, the one with the smaller shift.
   std::optional<PeriodicCell> cell = {};
   unsigned threads = 1;  ///< at most 256; 0: one per core. Has no effect on the result
 };
 
 /// Finds the `k` nearest other points of each point, on the CPU. Squares of distances are computed
 /// in double in both precisions, and compared without a rounding to Real; points at equal distances
-/// are listed by index. A k-d tree (Bentley 1975) is built and searched in O((N + k) log N) time
-/// for usual points. May be called concurrently.
-/// @param points [m], finite; in double, coordinates up to 1e150. Points may coincide.
+/// are listed by index. A k-d tree (Bentley 1975) is built and searched in O(N (log N + k log k))
+/// time for usual points. May be called concurrently.
+/// @param points [m], finite; coordinates up to 9e37 in float and 1e150 in double. Points may
+///   coincide; in double, points closer than 1e-162 do.
 /// @param k less than the number of points, or 0
 /// @throws InvalidArgument for a coordinate or an option out of its range, more than 2^32 - 1
 ///   points, or a `k` that exceeds the number of other points; with a cell, for a length that is

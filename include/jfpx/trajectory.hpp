@@ -37,7 +37,8 @@ class World;
 ///
 /// finish() creates the complete file under its name; until then, the data are in NAME.part in the
 /// same folder, which the destructor removes. It replaces the frames of an earlier run, and leaves
-/// other files in the folder of the frames. Not thread-safe.
+/// other files in the folder of the frames. If the frames of a `.pvd` cannot be moved, those of
+/// both runs may remain. Not thread-safe.
 class JFPX_API TrajectoryWriter {
  public:
   /// @throws InvalidArgument for another extension; FileError if the file cannot be created

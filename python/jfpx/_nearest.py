@@ -69,7 +69,7 @@ def find_nearest(positions: Any, k: int, *, query: Any = None, periodic: Any = N
     Parameters
     ----------
     positions : array (N, 3) of float32 or float64, N < 2^32
-        Points, finite, in any unit of length; in float64, coordinates up to 1e150. NumPy, any array
+        Points, finite, in any unit of length; coordinates up to 9e37 in float32 and 1e150 in float64. NumPy, any array
         in host memory with DLPack, or nested lists, which become float64. Any strides.
     k : int in [0, N - 1], with `query` in [0, N]
         Number of points in each row.

@@ -26,30 +26,36 @@ bool is_special(const fs::path& path) {
 }
 
 /// Target of a chain of symbolic links, which need not exist.
-std::string follow_links(const std::string& path) {
+fs::path follow_links(fs::path path) {
   constexpr int kMaxLinks = 40;  // the limit of Linux; links may form a cycle
-  fs::path target = to_path(path);
   std::error_code ignored;
-  for (int i = 0; i < kMaxLinks && fs::is_symlink(target, ignored); ++i) {
-    target = target.parent_path() / fs::read_symlink(target, ignored);
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(path, ignored); ++i) {
+    path = path.parent_path() / fs::read_symlink(path, ignored);
   }
-  return to_text(target);
+  return path;
+}
+
+/// The temporary file.
+fs::path part_of(fs::path target) {
+  if (!is_special(target)) target += ".part";
+  return target;
 }
 
 }  // namespace
 
 AtomicFile::AtomicFile(std::string path)
     : path_(std::move(path)),
-      target_(is_special(to_path(path_)) ? path_ : follow_links(path_)),
-      part_(is_special(to_path(target_)) ? target_ : target_ + ".part"),
-      file_(open_file(part_, "wb")) {
+      target_(is_special(to_path(path_)) ? to_path(path_) : follow_links(to_path(path_))),
+      part_(part_of(target_)),
+      file_(open_file(to_text(part_), "wb")) {
   if (file_ == nullptr) fail(errno);
 }
 
+// Allocates nothing, because an exception of an allocation may be the reason.
 AtomicFile::~AtomicFile() {
   if (file_ != nullptr) std::fclose(file_);
   std::error_code ignored;
-  if (!finished_ && part_ != target_) fs::remove(to_path(part_), ignored);
+  if (!finished_ && part_ != target_) fs::remove(part_, ignored);
 }
 
 void AtomicFile::write(std::string_view bytes) {
@@ -58,11 +64,17 @@ void AtomicFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail(errno);
 }
 
-void AtomicFile::finish() {
+void AtomicFile::close() {
   require_open();
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail(errno);
+  closed_ = true;
+}
+
+void AtomicFile::finish() {
+  if (!closed_) close();
+  if (finished_ || failed_) require_open();
   std::error_code error;
-  if (part_ != target_) fs::rename(to_path(part_), to_path(target_), error);
+  if (part_ != target_) fs::rename(part_, target_, error);
   if (error) fail(error.default_error_condition().value());
   finished_ = true;
 }

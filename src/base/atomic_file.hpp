@@ -4,6 +4,7 @@
 #include <jfpx/config.hpp>
 
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -24,6 +25,9 @@ class JFPX_API AtomicFile {
 
   /// @throws FileError; all later calls also throw, because part of the content may be missing
   void write(std::string_view bytes);
+  /// Ends writing, so that finish() has only to rename. No call of write() may follow.
+  /// @throws FileError, for example if the disk is full
+  void close();
   /// Completes the file. No call of write() may follow. @throws FileError
   void finish();
 
@@ -32,10 +36,11 @@ class JFPX_API AtomicFile {
   [[noreturn]] void fail(int error_number);
 
   std::string path_;
-  std::string target_;  ///< path_ with symbolic links resolved
-  std::string part_;    ///< path of the temporary file; target_ if that is not a regular file
+  std::filesystem::path target_;  ///< path_ with symbolic links resolved
+  /// Path of the temporary file; target_ if that is not a regular file.
+  std::filesystem::path part_;
   std::FILE* file_;
-  bool finished_ = false, failed_ = false;
+  bool closed_ = false, finished_ = false, failed_ = false;
 };
 
 }  // namespace JFPX_ABI

@@ -1,4 +1,6 @@
 /// Implementation of system.hpp and atomic_wait.hpp for Windows, by its functions for UTF-16.
+#include <jfpx/error.hpp>
+
 #include "src/base/atomic_wait.hpp"
 #include "src/base/system.hpp"
 
@@ -6,10 +8,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <cwchar>
-#include <exception>
 #include <fcntl.h>
 #include <io.h>
 #include <process.h>
+#include <system_error>
 #include <vector>
 
 #ifndef NOMINMAX
@@ -48,19 +50,20 @@ std::wstring quoted(const std::wstring& argument) {
 
 const char* const kCacheFolderVariable = "LOCALAPPDATA";
 
-fs::path to_path(const std::string& text) { return std::u8string(text.begin(), text.end()); }
+fs::path to_path(const std::string& text) {
+  try {
+    return std::u8string(text.begin(), text.end());
+  } catch (const fs::filesystem_error&) {
+    throw FileError(text + ": its name is not UTF-8");
+  }
+}
 std::string to_text(const fs::path& path) {
   const std::u8string text = path.u8string();
   return {text.begin(), text.end()};
 }
 
 std::FILE* open_file(const std::string& path, const char* mode) {
-  try {
-    return ::_wfopen(to_path(path).c_str(), widened(mode).c_str());
-  } catch (const std::exception&) {  // no UTF-8
-    errno = EILSEQ;
-    return nullptr;
-  }
+  return ::_wfopen(to_path(path).c_str(), widened(mode).c_str());
 }
 
 fs::path folder_from_environment(const char* variable) {
@@ -116,6 +119,10 @@ fs::path program_path() {
   for (;;) {
     const DWORD length =
         ::GetModuleFileNameW(nullptr, path.data(), static_cast<DWORD>(path.size()));
+    if (length == 0) {
+      const std::error_code error(static_cast<int>(::GetLastError()), std::system_category());
+      throw fs::filesystem_error("the file of the program is not known", error);
+    }
     if (length < path.size()) return path.substr(0, length);
     path.resize(2 * path.size());
   }
@@ -129,6 +136,9 @@ std::string run_instead(const fs::path& program, const std::vector<std::string>&
   std::vector<const wchar_t*> pointers;
   for (const std::wstring& text : texts) pointers.push_back(text.c_str());
   pointers.push_back(nullptr);
+  // Ctrl-C is for the other program, which inherits no handler. This one waits for its end.
+  ::SetConsoleCtrlHandler(
+      [](DWORD event) -> BOOL { return event == CTRL_C_EVENT || event == CTRL_BREAK_EVENT; }, TRUE);
   const std::intptr_t status = ::_wspawnv(_P_WAIT, program.c_str(), pointers.data());
   if (status == -1) return std::strerror(errno);
   std::exit(static_cast<int>(status));

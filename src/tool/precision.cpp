@@ -18,10 +18,15 @@ namespace {
 /// The same program in the other precision: NAME and NAME-f64 are in the same folder.
 std::filesystem::path sibling_of(const std::filesystem::path& program) {
   constexpr std::string_view kSuffix = "-f64";
-  const std::string name = to_text(program.stem());
-  const std::string sibling = name.ends_with(kSuffix) ? name.substr(0, name.size() - kSuffix.size())
-                                                      : name + std::string(kSuffix);
-  return program.parent_path() / to_path(sibling + to_text(program.extension()));
+  const std::string_view extension = program.extension() == ".exe" ? ".exe" : "";
+  std::string name = to_text(program.filename());
+  name.resize(name.size() - extension.size());
+  if (name.ends_with(kSuffix)) {
+    name.resize(name.size() - kSuffix.size());
+  } else {
+    name += kSuffix;
+  }
+  return program.parent_path() / to_path(name.append(extension));
 }
 
 /// The precision that the arguments select; empty if they select none.

@@ -4,12 +4,14 @@
 #include <jfpx/recording.hpp>
 #include <jfpx/thesis/particle.hpp>
 
+#include "src/base/atomic_file.hpp"
 #include "tests/support/failing_new.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/world/random_bodies.hpp"
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -423,6 +425,16 @@ TEST(OutOfMemoryInACollider, ACallAfterAFailedOneFindsAllContacts) {
 
 // Does not hold for the JSON in the header of a recording and in scene files: the JSON library
 // terminates the program when a small allocation fails.
+TEST(OutOfMemoryInFiles, AnUnfinishedFileIsRemovedWithoutMemory) {
+  const TemporaryFolder folder;
+  std::optional<AtomicFile> file(folder.file("file"));
+  {
+    const FailingNew failing(0, Shortage::permanent);
+    file.reset();
+  }
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
 TEST(OutOfMemoryInRecordings, FramesAreWrittenWithoutMemoryAndReadOnTheNextAttempt) {
   const TemporaryFolder folder;
   const std::string path = folder.file("run.rec");

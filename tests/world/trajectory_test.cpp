@@ -260,6 +260,32 @@ TEST(Trajectory, ReplacesTheFramesOfAnEarlierRunAndNoOtherFile) {
   EXPECT_EQ(folder.entries(), 2u);
 }
 
+TEST(Trajectory, RemovesTheFramesOfAKilledRun) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder.file("run.part"));
+  for (const char* frame : {"run.part/run_000001.vtp", "run.part/run_000007.vtp"}) {
+    write_file(folder.file(frame), "part");
+  }
+  TrajectoryWriter writer(folder.file("run.pvd"));
+  writer.append(World(scene_of_shapes()));
+  writer.finish();
+  EXPECT_EQ(folder.entries(), 2u);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.file("run")), fs::directory_iterator()), 1);
+}
+
+TEST(Trajectory, IsNotFinishedAfterAFailedAttempt) {
+  const TemporaryFolder folder;
+  {
+    TrajectoryWriter writer(folder.file("run.pvd"));
+    writer.append(World(scene_of_shapes()));
+    write_file(folder.file("run"), "mine");
+    EXPECT_THROW(writer.finish(), FileError);
+    fs::remove(folder.file("run"));
+    EXPECT_THROW(writer.finish(), FileError) << "the index would have two ends";
+  }
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
 TEST(Trajectory, WithoutBodiesHasEmptyFrames) {
   const TemporaryFolder folder;
   const World world{Scene{}};

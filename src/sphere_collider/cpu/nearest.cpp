@@ -15,12 +15,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// [m], largest coordinate in double: squares of distances are finite.
-constexpr double kLargestCoordinate = 1e150;
+/// [m], largest coordinate: squares of distances are finite in double, and distances in Real.
+constexpr double kLargestCoordinate = sizeof(Real) == 4 ? 9e37 : 1e150;
 
-void check_points(std::span<const Vec3> points, const PeriodicCell* cell, const char* name) {
+void check_points(std::span<const Vec3> points, const PeriodicCell* cell, const std::string& name,
+                  const char* names) {
   if (points.size() > cpu::PointTree::kNone) {
-    throw InvalidArgument("number of " + std::string(name) + "s is " +
+    throw InvalidArgument(std::string("number of ") + names + " is " +
                           std::to_string(points.size()) + "; it must be less than 2^32");
   }
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -31,12 +32,12 @@ void check_points(std::span<const Vec3> points, const PeriodicCell* cell, const 
       if (!is_finite(x)) {
         range = "finite";
       } else if (std::abs(static_cast<double>(x)) > kLargestCoordinate) {
-        range = "at most 1e150";
+        range = sizeof(Real) == 4 ? "at most 9e37" : "at most 1e150";
       } else if (repeats && !detail::is_reducible(x, cell->lengths[k])) {
         range = "within 2^20 periodic lengths";
       }
       if (range == nullptr) continue;
-      throw InvalidArgument(std::string(name) + " " + std::to_string(i) + ": " + "xyz"[k] + " is " +
+      throw InvalidArgument(name + " " + std::to_string(i) + ": " + "xyz"[k] + " is " +
                             detail::to_text(x) + "; it must be " + range);
     }
   }
@@ -47,8 +48,8 @@ NearestPoints find_rows(std::span<const Vec3> points, const std::span<const Vec3
                         std::size_t k, const NearestOptions& options) {
   const PeriodicCell* const cell = options.cell ? &*options.cell : nullptr;
   if (cell != nullptr) detail::check_cell(*cell, 0, "");
-  check_points(points, cell, "point");
-  if (queries != nullptr) check_points(*queries, cell, "query");
+  check_points(points, cell, "point", "points");
+  if (queries != nullptr) check_points(*queries, cell, "query", "queries");
   const std::size_t candidates =
       queries == nullptr && !points.empty() ? points.size() - 1 : points.size();
   if (k > candidates) {
@@ -68,11 +69,12 @@ NearestPoints find_rows(std::span<const Vec3> points, const std::span<const Vec3
   if (rows == 0 || k == 0) return found;
   const cpu::PeriodicMetric metric(cell);
   const cpu::PointTree tree(points, metric, pool);
-  constexpr std::size_t kQueriesPerChunk = 128;
-  run_interruptible(pool, (rows + kQueriesPerChunk - 1) / kQueriesPerChunk, [&](std::size_t chunk) {
+  // Interrupts end a search between two chunks.
+  const std::size_t of_chunk = std::max<std::size_t>(1, 128 / (1 + k / 128));
+  run_interruptible(pool, (rows + of_chunk - 1) / of_chunk, [&](std::size_t chunk) {
     cpu::NearestList list(k);
-    const std::size_t end = std::min(rows, (chunk + 1) * kQueriesPerChunk);
-    for (std::size_t i = chunk * kQueriesPerChunk; i < end; ++i) {
+    const std::size_t end = std::min(rows, (chunk + 1) * of_chunk);
+    for (std::size_t i = chunk * of_chunk; i < end; ++i) {
       const std::size_t row = queries == nullptr ? tree.index(i) : i;
       const Vec3& query = queries == nullptr ? points[row] : (*queries)[row];
       list.clear();

@@ -187,13 +187,17 @@ struct TrajectoryWriter::Vtk final : Format {
     if (fs::exists(folder) && !fs::is_directory(folder)) fail(folder, ENOTDIR);
     fs::create_directory(part, error);
     if (error) fail(part, error.value());
+    remove_frames(part, 0);  // of a run that was killed
     index.write(
         "<?xml version=\"1.0\"?>\n"
         "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
         "  <Collection>\n");
   }
   ~Vtk() override {
-    remove_frames(part, 0);
+    try {
+      remove_frames(part, 0);
+    } catch (const std::bad_alloc&) {  // the files remain
+    }
     std::error_code ignored;
     fs::remove(part, ignored);  // unless it has other files
   }
@@ -213,7 +217,9 @@ struct TrajectoryWriter::Vtk final : Format {
 
   void finish() override {
     require_success();
+    failed = true;
     index.write("  </Collection>\n</VTKFile>\n");
+    index.close();
     std::error_code error;
     fs::create_directory(folder, error);
     if (error) fail(folder, error.value());
@@ -224,6 +230,7 @@ struct TrajectoryWriter::Vtk final : Format {
     remove_frames(folder, frames);
     fs::remove(part, error);
     index.finish();
+    failed = false;
   }
 
   std::string file_name(std::size_t frame) const {
@@ -231,9 +238,22 @@ struct TrajectoryWriter::Vtk final : Format {
     std::snprintf(number, sizeof number, "_%06zu.vtp", frame);
     return name + number;
   }
+  /// Removes the frames of this name from number `first`.
   void remove_frames(const fs::path& from, std::size_t first) const {
+    const std::string before = name + '_';
     std::error_code ignored;
-    while (fs::remove(from / to_path(file_name(first)), ignored)) ++first;
+    std::vector<fs::path> frames_there;
+    for (fs::directory_iterator it(from, ignored), end; it != end; it.increment(ignored)) {
+      const std::string file = to_text(it->path().filename());
+      std::size_t number = 0;
+      if (!file.starts_with(before)) continue;
+      const char* const digits = file.data() + before.size();
+      const auto [rest, bad] = std::from_chars(digits, file.data() + file.size(), number);
+      if (bad == std::errc() && std::string_view(rest) == ".vtp" && number >= first) {
+        frames_there.push_back(it->path());
+      }
+    }
+    for (const fs::path& path : frames_there) fs::remove(path, ignored);
   }
   void require_success() const {
     if (failed) throw FileError(to_text(folder) + ": an earlier write failed");
