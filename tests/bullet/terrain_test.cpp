@@ -16,6 +16,10 @@
 #include <set>
 #include <utility>
 
+#if !defined(_WIN32)
+#include "tests/bullet/stack_use.hpp"
+#endif
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
