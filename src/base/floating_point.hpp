@@ -37,6 +37,26 @@ class TrapsMasked {
 #endif
 };
 
+/// The rounding, traps, flush-to-zero and status flags of a thread.
+class FloatingPointEnvironment {
+ public:
+  /// That of the calling thread.
+  FloatingPointEnvironment() noexcept { std::fegetenv(&environment_); }
+  /// Makes it that of the calling thread.
+  void apply() const noexcept {
+    std::fesetenv(&environment_);
+#if defined(_WIN32) && defined(__x86_64__)
+    _mm_setcsr(vector_);
+#endif
+  }
+
+ private:
+  std::fenv_t environment_{};
+#if defined(_WIN32) && defined(__x86_64__)
+  unsigned vector_ = _mm_getcsr();  // MinGW-w64's environment is that of the x87 unit alone
+#endif
+};
+
 /// Whether no floating-point exception raises a trap.
 inline bool traps_are_masked() noexcept {
 #if defined(__x86_64__)

@@ -4,11 +4,11 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/atomic_wait.hpp"
+#include "src/base/floating_point.hpp"
 #include "src/base/pause.hpp"
 
 #include <algorithm>
 #include <atomic>
-#include <cfenv>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -77,8 +77,8 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   /// Part of a loop, limited to the number of chunks that a ticket can count.
   struct Job {
     Loop loop;
-    std::size_t first = 0;      ///< number of the first chunk
-    std::fenv_t environment{};  ///< of the calling thread
+    std::size_t first = 0;                 ///< number of the first chunk
+    FloatingPointEnvironment environment;  ///< of the calling thread
   };
   /// Chunks of a thread.
   struct alignas(64) Ticket {
@@ -221,7 +221,6 @@ ThreadPool::Workers::~Workers() {
 
 std::exception_ptr ThreadPool::Workers::run(const Loop& loop) {
   Job job;
-  std::fegetenv(&job.environment);
   // Loops with more chunks than a ticket can count are split.
   constexpr std::size_t kMaxChunks = 0xffffffffu;
   for (job.first = 0; job.first < loop.chunks; job.first += kMaxChunks) {
@@ -313,7 +312,7 @@ void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::ui
         std::clamp<std::uint64_t>(left / kPortionDivisor, 1, kLargestPortion);
     if (!value.compare_exchange_weak(ticket, ticket - taken)) continue;
     const auto number = static_cast<std::uint32_t>(ticket >> 32);
-    if (is_worker && *prepared != number) std::fesetenv(&job_.environment);
+    if (is_worker && *prepared != number) job_.environment.apply();
     *prepared = number;
     run_chunks(job_.first + first_chunk(owner + 1) - left, static_cast<std::uint32_t>(taken));
     ticket = value.load();

@@ -1,5 +1,6 @@
 /// Bodies of many shapes fall onto terrains: stock and ours stay bit-identical with all three
 /// classes and any number of threads.
+#include "src/base/floating_point.hpp"
 #include "tests/bullet/all_parts.hpp"
 
 #include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
@@ -392,13 +393,13 @@ TEST(SmallStacks, AreUsedLittleMoreThanByStockBullet) {
 /// Restores the floating-point environment at the end of a test.
 class EnvironmentKept {
  public:
-  EnvironmentKept() { std::fegetenv(&kept_); }
-  ~EnvironmentKept() { std::fesetenv(&kept_); }
+  EnvironmentKept() = default;
+  ~EnvironmentKept() { kept_.apply(); }
   EnvironmentKept(const EnvironmentKept&) = delete;
   EnvironmentKept& operator=(const EnvironmentKept&) = delete;
 
  private:
-  std::fenv_t kept_{};
+  FloatingPointEnvironment kept_;
 };
 
 constexpr int kTraps = FE_INVALID | FE_DIVBYZERO | FE_OVERFLOW;
