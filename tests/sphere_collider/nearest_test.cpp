@@ -154,6 +154,7 @@ std::string error_of(const Points& points, const Points* queries, std::size_t k,
 }
 
 TEST(Nearest, BadInputIsNamed) {
+  using ::testing::EndsWith;
   using ::testing::HasSubstr;
   const Points points(4);
   EXPECT_EQ(error_of(points, nullptr, 4),
@@ -169,9 +170,8 @@ TEST(Nearest, BadInputIsNamed) {
             "point 1: x is 2000000; it must be within 2^20 periodic lengths");
   const bool is_double = sizeof(Real) == 8;
   const auto large = static_cast<Real>(is_double ? 1e151 : 1e38);
-  EXPECT_EQ(error_of({{0, 0, 0}, {large, 0, 0}}, nullptr, 1),
-            is_double ? "point 1: x is 1e+151; it must be at most 1e150"
-                      : "point 1: x is 1e+38; it must be at most 9e37");
+  EXPECT_THAT(error_of({{0, 0, 0}, {large, 0, 0}}, nullptr, 1),
+              EndsWith(is_double ? "; it must be at most 1e150" : "; it must be at most 9e37"));
 }
 
 TEST(Nearest, ASearchCanBeInterrupted) {
