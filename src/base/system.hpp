@@ -28,7 +28,7 @@ JFPX_API std::filesystem::path folder_from_environment(const char* variable);
 /// The folder for files that can be made again: XDG_CACHE_HOME or .cache in HOME (XDG base
 /// directory specification); on Windows, LOCALAPPDATA. Empty if the environment names none.
 JFPX_API std::filesystem::path cache_folder();
-/// The names of the variables that cache_folder() reads, for error messages.
+/// The variable that is missing if cache_folder() is empty, for error messages.
 JFPX_API extern const char* const kCacheFolderVariable;
 
 /// Asks for huge pages, where the system takes advice. @param memory aligned to a page
