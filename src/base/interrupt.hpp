@@ -48,12 +48,11 @@ inline void poll_interrupt() {
   if (Interrupt* const interrupt = Interrupt::current()) interrupt->poll();
 }
 
-/// pool.run(chunks, body), which an interrupt of the calling thread can end: all threads then skip
-/// the remaining chunks. A single chunk is not interrupted.
+/// run_interruptible() with an interrupt. A function of its own, because programs with small stacks
+/// have none.
 template <class Body>
-void run_interruptible(ThreadPool& pool, std::size_t chunks, const Body& body) {
-  Interrupt* const interrupt = Interrupt::current();
-  if (interrupt == nullptr || chunks <= 1) return pool.run(chunks, body);
+[[gnu::noinline]] void run_with_interrupt(Interrupt* interrupt, ThreadPool& pool,
+                                          std::size_t chunks, const Body& body) {
   std::atomic<bool> ended{false};
   pool.run(chunks, [&](std::size_t chunk) {
     if (ended.load(std::memory_order_relaxed)) return;
@@ -67,6 +66,15 @@ void run_interruptible(ThreadPool& pool, std::size_t chunks, const Body& body) {
     }
     body(chunk);
   });
+}
+
+/// pool.run(chunks, body), which an interrupt of the calling thread can end: all threads then skip
+/// the remaining chunks. A single chunk is not interrupted.
+template <class Body>
+void run_interruptible(ThreadPool& pool, std::size_t chunks, const Body& body) {
+  Interrupt* const interrupt = Interrupt::current();
+  if (interrupt == nullptr || chunks <= 1) return pool.run(chunks, body);
+  run_with_interrupt(interrupt, pool, chunks, body);
 }
 
 /// Calls body(first, last) for the parts of [0, count), in order, in the calling thread, whose

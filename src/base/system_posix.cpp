@@ -36,11 +36,9 @@ fs::path cache_folder() {
   return home.empty() ? fs::path() : home / ".cache";
 }
 
-void advise_huge_pages(void* memory, std::size_t bytes) noexcept {
+void advise_huge_pages([[maybe_unused]] void* memory, [[maybe_unused]] std::size_t bytes) noexcept {
 #if defined(MADV_HUGEPAGE)
   ::madvise(memory, bytes, MADV_HUGEPAGE);  // a hint, so a failure is not an error
-#else
-  static_cast<void>(memory), static_cast<void>(bytes);
 #endif
 }
 
