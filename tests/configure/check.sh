@@ -86,6 +86,7 @@ END
   # pip compiles for the GPUs of the machine, where nvcc supports them.
   gpu)
     command -v nvcc >/dev/null || { echo "skipped: there is no nvcc"; exit 0; }
+    unset CUDAARCHS # which scripts/test sets
     while read -r expected capabilities; do
       printf '#!/bin/sh\nprintf "%s"\n' "$capabilities" >"$work/nvidia-smi"
       chmod +x "$work/nvidia-smi"
