@@ -7,6 +7,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
+#if defined(__linux__)
+// In a library that is loaded later, the default model takes a call that may allocate, with the
+// stack of malloc().
+[[gnu::tls_model("initial-exec")]]
+#endif
 thread_local constinit Interrupt* current_interrupt = nullptr;
 
 }  // namespace
