@@ -16,8 +16,8 @@ inline namespace JFPX_ABI {
 
 /// While it exists, searches of the thread that created it call a function at intervals, in this
 /// thread. An exception of the function ends the search, which throws it; the collider stays
-/// usable. Only loops of the functions below are interruptible. Without an interrupt, these loops
-/// read a thread-local pointer and do nothing else.
+/// usable. Only loops of the functions below are interruptible. In a program without an interrupt,
+/// these loops read one counter and do nothing else.
 class JFPX_API Interrupt {
  public:
   using Clock = std::chrono::steady_clock;
@@ -48,11 +48,12 @@ inline void poll_interrupt() {
   if (Interrupt* const interrupt = Interrupt::current()) interrupt->poll();
 }
 
-/// run_interruptible() with an interrupt. A function of its own, because programs with small stacks
-/// have none.
+/// pool.run(chunks, body), which an interrupt of the calling thread can end: all threads then skip
+/// the remaining chunks. A single chunk is not interrupted.
 template <class Body>
-[[gnu::noinline]] void run_with_interrupt(Interrupt* interrupt, ThreadPool& pool,
-                                          std::size_t chunks, const Body& body) {
+void run_interruptible(ThreadPool& pool, std::size_t chunks, const Body& body) {
+  Interrupt* const interrupt = Interrupt::current();
+  if (interrupt == nullptr || chunks <= 1) return pool.run(chunks, body);
   std::atomic<bool> ended{false};
   pool.run(chunks, [&](std::size_t chunk) {
     if (ended.load(std::memory_order_relaxed)) return;
@@ -66,15 +67,6 @@ template <class Body>
     }
     body(chunk);
   });
-}
-
-/// pool.run(chunks, body), which an interrupt of the calling thread can end: all threads then skip
-/// the remaining chunks. A single chunk is not interrupted.
-template <class Body>
-void run_interruptible(ThreadPool& pool, std::size_t chunks, const Body& body) {
-  Interrupt* const interrupt = Interrupt::current();
-  if (interrupt == nullptr || chunks <= 1) return pool.run(chunks, body);
-  run_with_interrupt(interrupt, pool, chunks, body);
 }
 
 /// Calls body(first, last) for the parts of [0, count), in order, in the calling thread, whose
