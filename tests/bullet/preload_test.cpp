@@ -335,9 +335,12 @@ TEST_F(Preload, TakesLittleMoreStackThanBullet) {
     return std::stoi(result.output.substr(hash_size));
   };
   for (const std::string threads : {"1", "2"}) {
-    const ProcessResult ours =
-        jfpx_command("preload --minimum-batch 0 --threads " + threads + " -- " + program);
+    const std::string command = "preload --minimum-batch 0 --threads " + threads;
+    const ProcessResult ours = jfpx_command(command + " -- " + program);
     EXPECT_LE(bytes_of(ours), bytes_of(stock) + 4096) << threads << " threads";
+    EXPECT_THAT(jfpx_command(command + " --summary -- " + program + " 2>&1").output,
+                HasSubstr("solver: "))
+        << "jfpx has computed";
   }
 }
 

@@ -25,8 +25,9 @@ namespace {
 struct SolverState : btSequentialImpulseConstraintSolver {
   /// The memory of the arrays is Bullet's, whose allocator the program may replace or reset when
   /// its solver does not exist. It must therefore belong to the program's solver between groups.
-  static void swap_arrays(btSequentialImpulseConstraintSolver* a,
-                          btSequentialImpulseConstraintSolver* b) {
+  /// Not inlined, because its copies of arrays would be on the stack of the solver.
+  [[gnu::noinline]] static void swap_arrays(btSequentialImpulseConstraintSolver* a,
+                                            btSequentialImpulseConstraintSolver* b) {
     const auto swap = [&](auto member) { swap_bytes(&(a->*member), &(b->*member)); };
     swap(&SolverState::m_tmpSolverBodyPool);
     swap(&SolverState::m_tmpSolverContactConstraintPool);
