@@ -119,30 +119,46 @@ struct RowSetup {
     return speed > restitution_threshold ? restitution * speed : Real(0);
   }
 
+  /// What a SphereRow reads of a body.
+  struct Sphere {
+    Real inverse_mass = 0;     ///< as SolverBody
+    Real inverse_inertia = 0;  ///< as SolverBody
+    Real radius = 0;           ///< [m]
+    Real friction = 0, restitution = 0;
+  };
+  JFPX_HD Sphere sphere(std::uint32_t body) const {
+    return {start[body].inverse_mass, start[body].inverse_inertia, properties.radius[body],
+            properties.friction[body], properties.restitution[body]};
+  }
+
   template <bool kFixed>
   JFPX_HD void fill(SphereRow* row, NoPart*, std::uint32_t contact) const {
     const ContactKey& key = contacts.key(contact);
     const bool flipped = is_flipped(key);
+    row->a = flipped ? key.b : key.a;
+    row->b = flipped ? key.a : key.b;
+    fill<kFixed>(row, contact, flipped, sphere(row->a), sphere(row->b));
+  }
+  /// fill() without the numbers of the bodies.
+  /// @param flipped is_flipped()
+  template <bool kFixed>
+  JFPX_HD void fill(SphereRow* row, std::uint32_t contact, bool flipped, const Sphere& a,
+                    const Sphere& b) const {
     const Real distance = contacts.distance(contact, 0);
     const Vec3& normal = contacts.normal(contact);
     const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact)];
-    row->a = flipped ? key.b : key.a;
-    row->b = flipped ? key.a : key.b;
     row->normal = flipped ? -normal : normal;
     row->distance = distance;
     // Penetrating spheres share the middle of the overlap, which conserves angular momentum.
     const Real half_overlap = distance < 0 ? distance * Real(0.5) : Real(0);
-    row->arm_a = properties.radius[row->a] + half_overlap;
-    row->arm_b = kFixed ? Real(0) : properties.radius[row->b] + half_overlap;
-    row->friction = combined(properties.rules.friction, properties.friction[row->a],
-                             properties.friction[row->b]);
+    row->arm_a = a.radius + half_overlap;
+    row->arm_b = kFixed ? Real(0) : b.radius + half_overlap;
+    row->friction = combined(properties.rules.friction, a.friction, b.friction);
     const Vec3 friction = in_tangent_plane(kept.friction, normal);
     row->friction_impulse = flipped ? -friction : friction;
     row->normal_impulse = -kept.normal;
-    const SolverBody &a = start[row->a], &b = start[row->b];
     set_masses<kFixed>(row, a, b);
-    row->restitution = combined(properties.rules.restitution, properties.restitution[row->a],
-                                properties.restitution[row->b]);
+    row->restitution = combined(properties.rules.restitution, a.restitution, b.restitution);
   }
 
   template <bool kFixed>
@@ -273,19 +289,16 @@ struct RowSetup {
         FramePose::of(*row, row->centres, properties.orientation[row->a], orientation_b));
   }
 
-  /// Writes the impulses of a row to its contact or joint.
-  JFPX_HD void store(const SphereRow& row, const NoPart* none, std::uint32_t contact) const {
-    store(row, none, contact, contacts.key(contact).a == row.a ? Real(1) : Real(-1));
-  }
-  /// @param side -1 if the row exchanges the bodies of the contact, otherwise 1
-  JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact, Real side) const {
+  /// Writes the impulses of a row to its contact or joint. Does not read the bodies of the row.
+  JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact) const {
+    const Real side = side_of(contact);
     const Real impulse = normal_impulse_of(row);
     const bool is_released = !(impulse > 0) && has_pushed(row);
     contacts.impulses[contacts.first_impulse(contact)] = {
         row.friction_impulse * side, is_released ? KeptImpulse::kReleased : impulse};
   }
   JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
-    const Real side = contacts.key(contact).a == row.a ? Real(1) : Real(-1);
+    const Real side = side_of(contact);
     if (contacts.rolling_impulses != nullptr) {
       contacts.rolling_impulses[contact] = row.rolling_impulse * side;
     }
@@ -317,6 +330,10 @@ struct RowSetup {
   }
 
  private:
+  /// -1 if the row exchanges the bodies of the contact, otherwise 1.
+  JFPX_HD Real side_of(std::uint32_t contact) const {
+    return is_flipped(contacts.key(contact)) ? Real(-1) : Real(1);
+  }
   /// The inertias of the bodies of a joint at the start of the step.
   template <bool kFixed>
   JFPX_HD BodyPair joint_pair(const auto& row) const {
@@ -334,16 +351,18 @@ struct RowSetup {
     Real distance_of_sphere = 0;
     Real inverse_gap, scale = 1;
 
-    /// @param row its bodies, normal and number of points are set
+    /// @param row its normal and number of points are set
     JFPX_HD FrictionPoints(const RowSetup& setup, const ManifoldRow& row, std::uint32_t contact)
         : points(nullptr),
-          is_flipped(setup.contacts.key(contact).a != row.a),
+          is_flipped(setup.is_flipped(setup.contacts.key(contact))),
           inverse_gap(setup.inverse_friction_gap) {
       if (setup.contacts.is_sphere(contact)) {
         distance_of_sphere = setup.contacts.distance(contact, 0);
         const Real half_overlap = distance_of_sphere < 0 ? distance_of_sphere * Real(0.5) : Real(0);
-        of_sphere = {-row.normal * (setup.properties.radius[row.a] + half_overlap),
-                     row.normal * (setup.properties.radius[row.b] + half_overlap)};
+        const ContactKey& key = setup.contacts.key(contact);
+        const Real *radius = setup.properties.radius, a = radius[is_flipped ? key.b : key.a],
+                   b = radius[is_flipped ? key.a : key.b];
+        of_sphere = {-row.normal * (a + half_overlap), row.normal * (b + half_overlap)};
         return;
       }
       points = setup.contacts.points + setup.contacts.manifold(contact).first;

@@ -38,8 +38,9 @@ JFPX_HD inline Real normal_impulse_of(const SphereRow& row) { return absolute(ro
 JFPX_HD inline bool has_pushed(const SphereRow& row) { return !std::signbit(row.normal_impulse); }
 
 /// `kFixed`: body b does not move.
-template <bool kFixed>
-JFPX_HD constexpr void set_masses(SphereRow* row, const SolverBody& a, const SolverBody& b) {
+/// @tparam Body has inverse_mass and inverse_inertia
+template <bool kFixed, class Body>
+JFPX_HD constexpr void set_masses(SphereRow* row, const Body& a, const Body& b) {
   Real linear = a.inverse_mass;
   Real angular = row->arm_a * row->arm_a * a.inverse_inertia;
   if constexpr (!kFixed) {

@@ -89,15 +89,15 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
     return stays ? motion : Vec3{};
   }
 
-  /// Velocities after the accelerations and the damping of a substep, without contacts.
-  /// @param orientation_now at the start of the substep
-  JFPX_HD void accelerate(std::uint32_t i, const Quat& orientation_now, Vec3* v, Vec3* w) const {
-    *v = detail::integrated_velocity(*v, last_acceleration[i], substep, velocity_kept[i]);
+  /// Angular acceleration of a movable body by the accumulated torque [rad/s^2].
+  JFPX_HD Vec3 angular_acceleration_of_step(std::uint32_t i) const {
     // The product of the inertia and a zero torque is +0, so the inertia is not read.
-    const bool is_driven = !(torque[i] == Vec3{});
-    const Vec3 angular = is_driven ? inverse_inertia[i] * torque[i] : Vec3{};
-    *w = detail::integrated_velocity(*w, angular, substep, angular_velocity_kept[i]);
-    if (!has_gyroscopic_term(i)) return;
+    return torque[i] == Vec3{} ? Vec3{} : inverse_inertia[i] * torque[i];
+  }
+
+  /// The angular velocity after the gyroscopic torque of a substep.
+  /// @param orientation_now at the start of the substep
+  JFPX_HD void turn_gyroscopically(std::uint32_t i, const Quat& orientation_now, Vec3* w) const {
     // Unlike precessed(), this does not transform the velocity to body axes and back. Rounding
     // makes the axes slightly non-orthonormal with a systematic sign, so the energy would grow
     // noticeably with many substeps.

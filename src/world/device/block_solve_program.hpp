@@ -2,7 +2,6 @@
 #pragma once
 
 #include "src/world/device/block_motion.hpp"
-#include "src/world/device/inner_bodies.hpp"
 #include "src/world/device/row_solver.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/sweep.hpp"
@@ -75,7 +74,6 @@ struct BlockSolveProgram : RowSolver<kKinds> {
     const bool has_overflow = sweep.overflow() > 0;
     for (std::uint32_t s = 0; s <= sweeps.size(); ++s) {
       sweep.number = s;
-      sweep.stores_impulses = sweeps.stores_impulses(s);
       BlockPhase phase{.sweeps = sweeps, .sweep = s};
       if (has_overflow && s < sweeps.size()) {
         phase.has_rows = false;
@@ -149,10 +147,7 @@ struct BlockSolveProgram : RowSolver<kKinds> {
   [[gnu::always_inline]] JFPX_HD void run_blocks(const Team& team, const Sweep& sweep,
                                                  const BlockPhase& phase) const {
     Sweep before = sweep;
-    if (phase.sweep > 0) {
-      before.number = phase.sweep - 1;
-      before.stores_impulses = phase.sweeps.stores_impulses(before.number);
-    }
+    if (phase.sweep > 0) before.number = phase.sweep - 1;
     team.for_blocks(data.block_count(), [&](std::uint32_t block, const auto& threads) {
       run_block(threads, before, phase, block);
     });
@@ -168,10 +163,8 @@ struct BlockSolveProgram : RowSolver<kKinds> {
     const std::uint32_t count = places.end - places.begin;
     const Motion motion(threads.shared(kSharedBytes));
     const bool has_inner = phase.inner_sweep() != SweepKind::none && block < d.placed_blocks();
-    threads.for_each(count, [&](std::uint32_t i) {
-      const std::uint32_t body = d.body_at[places.begin + i];
-      if (body != kNone) complete_body(before, phase, motion, i, body);
-    });
+    threads.for_each(
+        count, [&](std::uint32_t i) { complete_body(before, phase, motion, i, places.begin + i); });
     if (has_inner) {
       constexpr std::uint32_t kEnds = soft_step::kColorsPerClass + 1u;
       threads.for_each(kKinds * kEnds, [&](std::uint32_t i) {
@@ -280,29 +273,27 @@ struct BlockSolveProgram : RowSolver<kKinds> {
                                Row row) const {
     const StepData& d = data;
     constexpr bool kIsSphere = std::is_same_v<Row, soft_step::SphereRow>;
-    const InnerBodies inner = InnerBodies::of(row);
     const std::uint32_t* const body_at = d.body_at + first_place;
-    SolverBody a = motion.load(inner.a), b = motion.load(inner.b);
+    SolverBody a = motion.load(row.a), b = motion.load(row.b);
     const Vec3 shift_a = a.shift, shift_b = b.shift;
-    row.a = inner.a, row.b = inner.b;
-    const Impact impact{{d.step.bodies.last_acceleration, body_at}, row.a};
+    const Impact impact{{d.substep_bodies, first_place}, row.a};
     soft_step::RowContext<typename Row::Part, Impact> context{
         {&a, &b, nullptr, nullptr}, d.parts_of(row), &impact};
     Mat3 inertia_a, inertia_b;
     if constexpr (!kIsSphere) {
-      inertia_a = d.step.bodies.inverse_inertia[body_at[inner.a]];
-      inertia_b = d.step.bodies.inverse_inertia[body_at[inner.b]];
+      inertia_a = d.step.bodies.inverse_inertia[body_at[row.a]];
+      inertia_b = d.step.bodies.inverse_inertia[body_at[row.b]];
       context.bodies.inertia_a = &inertia_a;
       context.bodies.inertia_b = &inertia_b;
     }
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
       const std::uint32_t moves = phase.sweeps.moves(phase.sweep);
-      orientation_a = d.orientation_cells[body_at[inner.a]].load(moves);
-      orientation_b = d.orientation_cells[body_at[inner.b]].load(moves);
+      orientation_a = d.orientation_cells[body_at[row.a]].load(moves);
+      orientation_b = d.orientation_cells[body_at[row.b]].load(moves);
       const Quat* start = d.step.bodies.orientation;
-      context.orientations = {&orientation_a, &orientation_b, &start[body_at[inner.a]],
-                              &start[body_at[inner.b]]};
+      context.orientations = {&orientation_a, &orientation_b, &start[body_at[row.a]],
+                              &start[body_at[row.b]]};
     }
     Real restitution = 0;
     if constexpr (kIsSphere) restitution = row.restitution;
@@ -323,7 +314,7 @@ struct BlockSolveProgram : RowSolver<kKinds> {
           state.rotation_changed = true;
         }
         if (impact.is_pending) {
-          const BodyCells cells = d.cells(body_at[i]);
+          const BodyCells cells = d.cells(first_place + i);
           soft_step::FreeMotion free = cells.read_free(state.version);
           free.add(change.velocity, change.angular_velocity);
           cells.write_free(free, &state.version);
@@ -331,38 +322,25 @@ struct BlockSolveProgram : RowSolver<kKinds> {
         motion.set_state(i, state);
       }
     };
-    write(inner.a, a, shift_a, impact.of_a);
-    write(inner.b, b, shift_b, impact.of_b);
+    write(row.a, a, shift_a, impact.of_a);
+    write(row.b, b, shift_b, impact.of_b);
     if constexpr (Operation::kChangesRow) {
-      inner.put_into(&row);
       if constexpr (kIsSphere) {
         this->store_sphere_row(row, restitution, r);
       } else {
         store_changes(row, &d.rows<Row>()[r]);
       }
-      if (phase.sweeps.stores_impulses(phase.sweep)) {
-        const soft_step::RowSetup setup = d.row_setup();
-        if constexpr (kIsSphere) {
-          setup.store(row, nullptr, inner.contact, 1);  // both bodies are movable
-        } else {
-          const soft_step::ContactKey key = setup.key(inner.contact);
-          row.a = key.a, row.b = key.b;
-          setup.store(row, d.parts_of(row), inner.contact);
-        }
-      }
     }
   }
 
   /// Makes the motion of a body visible to crossing rows and to the next phase.
+  /// @param i     place of the body in its block
+  /// @param index its solver index
   JFPX_HD void publish(const BlockPhase& phase, const Motion& motion, std::uint32_t i,
-                       std::uint32_t place) const {
-    const StepData& d = data;
-    const std::uint32_t body = d.body_at[place];
-    if (body == kNone) return;
-    const RowBody constants = d.row_bodies[body];
-    if (!(constants.inverse_mass > 0)) return;
-    const BodyCells cells = d.cells(body);
+                       std::uint32_t index) const {
     const SolverBody state = motion.load(i);
+    if (!(state.inverse_mass > 0)) return;
+    const BodyCells cells = data.cells(index);
     typename Motion::State versions = motion.state(i);
     if (versions.shift_changed) cells.write_shift(state, &versions.version);
     if (versions.rotation_changed) cells.write_rotation(state, &versions.version);
@@ -372,11 +350,15 @@ struct BlockSolveProgram : RowSolver<kKinds> {
 
   /// Completes the sweep before, and puts the motion of the body into shared memory.
   /// @param place of the body in its block
+  /// @param i     its solver index
   JFPX_HD void complete_body(const Sweep& before, const BlockPhase& phase, const Motion& motion,
                              std::uint32_t place, std::uint32_t i) const {
     const StepData& d = data;
     const RowBody constants = d.row_bodies[i];
-    if (!(constants.inverse_mass > 0)) return;
+    if (!(constants.inverse_mass > 0)) {
+      motion.store_velocities(place, {});
+      return;
+    }
     ItemBody item;
     item.start(i, constants);
     typename Motion::State state;
@@ -397,23 +379,22 @@ struct BlockSolveProgram : RowSolver<kKinds> {
     switch (phase.stage()) {
       case BodyStage::none:
         break;
-      case BodyStage::finish:
-        d.step.solver[i] = body;
-        this->check_state(i);
+      case BodyStage::finish: {
+        const std::uint32_t index = d.body_at[i];
+        d.step.solver[index] = body;
+        d.step.orientation[index] = d.orientation[i];
+        this->check_state(index);
         return;
+      }
       case BodyStage::move:
-        d.step.move(i, &body);
+        this->move(d.body_at[i], i, phase.sweeps.moves(phase.sweep), &body);
         state.shift_changed = state.rotation_changed = true;
-        if constexpr (kKinds > soft_step::kContactRowKinds) {
-          if (d.is_joined(i)) {
-            d.orientation_cells[i].store(d.step.orientation[i], phase.sweeps.moves(phase.sweep));
-          }
-        }
         break;
       case BodyStage::accelerate: {
         const Vec3 shift = body.shift;
         free.read(cells, item.version);
-        d.step.accelerate(i, &body, &free.motion, false);
+        d.step.accelerate(d.body_at[i], d.substep_bodies.load(i), d.orientation[i], &body,
+                          &free.motion, false);
         free.is_changed = true;
         if (!(body.shift == shift)) state.shift_changed = true;
         break;

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 
 namespace jfpx {
@@ -102,14 +103,26 @@ class VectorCells {
   MemoryCell cells_[kCells];
 };
 
-/// Motion that the rows of a body read, in one cache line.
-struct alignas(16 * sizeof(Real)) MotionCells {
-  VectorCells velocity, angular_velocity, shift, rotation;
-};
+/// The motion of all bodies as cells, one array for each vector: consecutive threads that complete
+/// consecutive bodies access consecutive addresses.
+struct CellColumns {
+  /// Only rebounding rows read the free velocities.
+  enum Column {
+    kVelocity,
+    kAngularVelocity,
+    kShift,
+    kRotation,
+    kFreeVelocity,
+    kFreeSpin,
+    kColumns
+  };
 
-/// Free motion, which only rebounding rows read.
-struct FreeCells {
-  VectorCells velocity, angular_velocity;
+  VectorCells* cells = nullptr;  ///< kColumns arrays
+  std::size_t size = 0;          ///< number of bodies of an array
+
+  JFPX_HD VectorCells* at(Column column, std::uint32_t body) const {
+    return cells + column * size + body;
+  }
 };
 
 /// Orientation of a body with joints, and its number of moves in the step. A move stores the cells
@@ -159,7 +172,8 @@ class BodyCells {
     }
   };
 
-  JFPX_HD BodyCells(MotionCells* motion, FreeCells* free) : motion_(motion), free_(free) {}
+  /// @param i index of the body in the columns
+  JFPX_HD BodyCells(const CellColumns& columns, std::uint32_t i) : columns_(columns), i_(i) {}
 
   /// The motion before the first ticket.
   JFPX_HD void start(const soft_step::SolverBody& body, const soft_step::FreeMotion& free) const {
@@ -176,10 +190,10 @@ class BodyCells {
   template <bool kRotation>
   JFPX_HD bool read(std::uint32_t ticket, soft_step::SolverBody* body, Version* version) const {
     VectorCells v, w, s, r;
-    v.load(&motion_->velocity);
-    w.load(&motion_->angular_velocity);
-    s.load(&motion_->shift);
-    if constexpr (kRotation) r.load(&motion_->rotation);
+    v.load(at(CellColumns::kVelocity));
+    w.load(at(CellColumns::kAngularVelocity));
+    s.load(at(CellColumns::kShift));
+    if constexpr (kRotation) r.load(at(CellColumns::kRotation));
     body->velocity = v.vector();
     body->angular_velocity = w.vector();
     body->shift = s.vector();
@@ -196,30 +210,30 @@ class BodyCells {
   JFPX_HD void write(std::uint32_t ticket, const soft_step::SolverBody& body,
                      const Version& version) const {
     const std::uint32_t word = version.word(ticket);
-    VectorCells(body.velocity, word).store(&motion_->velocity);
-    VectorCells(body.angular_velocity, word).store(&motion_->angular_velocity);
+    VectorCells(body.velocity, word).store(at(CellColumns::kVelocity));
+    VectorCells(body.angular_velocity, word).store(at(CellColumns::kAngularVelocity));
   }
   /// Write a new version, before the velocities.
   JFPX_HD void write_shift(const soft_step::SolverBody& body, Version* version) const {
     version->shift = (version->shift + 1) & kVersionMask;
-    VectorCells(body.shift, version->shift).store(&motion_->shift);
+    VectorCells(body.shift, version->shift).store(at(CellColumns::kShift));
   }
   JFPX_HD void write_rotation(const soft_step::SolverBody& body, Version* version) const {
     version->rotation = (version->rotation + 1) & kVersionMask;
-    VectorCells(body.rotation, version->rotation).store(&motion_->rotation);
+    VectorCells(body.rotation, version->rotation).store(at(CellColumns::kRotation));
   }
   JFPX_HD void write_free(const soft_step::FreeMotion& free, Version* version) const {
     version->free = (version->free + 1) & kVersionMask;
-    VectorCells(free.velocity, version->free).store(&free_->velocity);
-    VectorCells(free.angular_velocity, version->free).store(&free_->angular_velocity);
+    VectorCells(free.velocity, version->free).store(at(CellColumns::kFreeVelocity));
+    VectorCells(free.angular_velocity, version->free).store(at(CellColumns::kFreeSpin));
   }
   /// Reads the free motion of a version that read() has returned. It is stored before the
   /// velocities, so the wait is short.
   JFPX_HD soft_step::FreeMotion read_free(const Version& version) const {
     VectorCells v, w;
     do {
-      v.load(&free_->velocity);
-      w.load(&free_->angular_velocity);
+      v.load(at(CellColumns::kFreeVelocity));
+      w.load(at(CellColumns::kFreeSpin));
     } while (v.word() != version.free || w.word() != version.free);
     return {v.vector(), w.vector()};
   }
@@ -233,8 +247,10 @@ class BodyCells {
   // of the substeps, and the restitution.
   static_assert((soft_step::kMostSweeps + 2) * Tickets::kPerSweep < kTicketMask);
 
-  MotionCells* motion_;
-  FreeCells* free_;
+  JFPX_HD VectorCells* at(CellColumns::Column column) const { return columns_.at(column, i_); }
+
+  CellColumns columns_;
+  std::uint32_t i_;
 };
 
 /// Constants of a body during a step, for its rows.

@@ -28,6 +28,17 @@ struct CommitProgram {
     const Progress& progress = d.counters->progress;
     const std::uint64_t steps = progress.offset + progress.completed;  // before complete()
     const soft_step::ContactView contacts = d.contacts();  // before complete() changes the parity
+    const soft_step::RowSetup setup = d.row_setup();
+    team.count(
+        contacts.sphere_count,
+        [&](std::uint32_t i) {
+          store_impulses(setup, i);
+          return soft_step::has_touched(contacts, i);
+        },
+        &d.counters->touching_spheres);
+    team.for_each_nowait(setup.size() - contacts.sphere_count, [&](std::uint32_t i) {
+      store_impulses(setup, contacts.sphere_count + i);
+    });
     ContinuousCollision{d.step, d.swept_bounds.sub_shapes, d.trees}.run(
         team, bodies.count, [&](std::uint32_t i) { return bodies.ids[i].index; },
         &d.counters->any_fast);
@@ -41,9 +52,6 @@ struct CommitProgram {
     team.count(
         bodies.count, [&](std::uint32_t i) { return bodies.is_active(bodies.ids[i].index); },
         &d.counters->awake);
-    team.count(
-        contacts.sphere_count, [&](std::uint32_t i) { return soft_step::has_touched(contacts, i); },
-        &d.counters->touching_spheres);
     team.for_each_nowait(contacts.manifold_count, [&](std::uint32_t m) {
       const std::uint32_t begun = soft_step::count_begun(contacts, contacts.sphere_count + m);
       if (begun > 0) atomic_add(&d.counters->begun_points, begun);
@@ -57,6 +65,16 @@ struct CommitProgram {
   }
 
  private:
+  /// Stores the impulses of the row of a contact or joint.
+  JFPX_HD void store_impulses(const soft_step::RowSetup& setup, std::uint32_t i) const {
+    const soft_step::RowKind kind = setup.kind_of(i);
+    if (kind == soft_step::kNoRow) return;
+    soft_step::visit_row(kind, [&](auto type) {
+      const auto& row = data.row<typename decltype(type)::type>(data.row_of[i]);
+      setup.store(row, data.parts_of(row), i);
+    });
+  }
+
   /// Device version of Partition::update().
   template <class Team>
   JFPX_HD void renew_partition(const Team& team) const {

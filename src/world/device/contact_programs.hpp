@@ -60,12 +60,14 @@ struct BoundsProgram {
   JFPX_HD void put_into_block(std::uint32_t body) const {
     const StepData& d = data;
     const std::uint32_t place = d.step.bodies.place[body];
+    std::uint32_t index = place;
     if (place == soft_step::kNoPlace) {
-      d.body_at[d.first_without_place() + atomic_add(&d.counters->without_place, 1)] = body;
+      index = d.first_without_place() + atomic_add(&d.counters->without_place, 1);
     } else {
-      d.body_at[place] = body;
       raise(&d.counters->places, place + 1);
     }
+    d.body_at[index] = body;
+    d.solver_index[body] = index;
   }
 
   JFPX_HD void start(std::uint32_t body) const {

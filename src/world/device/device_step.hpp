@@ -416,6 +416,7 @@ class DeviceStep final : public DeviceWorld {
     make_room();
     const ContactSizes& last = last_contacts().sizes();
     data_.swept_bounds.bodies = data_.step.bodies;
+    data_.orientation = scratch_.orientation_of_step(data_);
     const StepData& d = data_;
     const std::size_t bodies = d.step.bodies.count;
     const std::size_t sub_shapes = d.swept_bounds.sub_shapes.ranges.bounded();

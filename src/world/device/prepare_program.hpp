@@ -2,7 +2,6 @@
 #pragma once
 
 #include "src/base/atomic.hpp"
-#include "src/world/device/inner_bodies.hpp"
 #include "src/world/device/list.hpp"
 #include "src/world/device/step_data.hpp"
 
@@ -18,6 +17,7 @@ struct PrepareProgram {
     std::uint32_t next[soft_step::kRowKinds][soft_step::kColorsPerClass];
     std::uint32_t points;  ///< of manifolds: their number, then the next one
     bool has_room[soft_step::kRowKinds];
+    soft_step::RowSetup::Sphere spheres[kBodiesPerBlock];  ///< by place in the block
   };
 
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kPrepare;
@@ -30,7 +30,19 @@ struct PrepareProgram {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
     if (d.counters->any_asleep != 0) d.islands().wake_touched(team);
-    team.for_each(bodies.count, [&](std::uint32_t i) { start(bodies.ids[i].index); });
+    if (bodies.has_blocks) {
+      team.for_each(bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); });
+      team.for_each(d.index_count(), [&](std::uint32_t i) {
+        const std::uint32_t index = d.solver_index_of(i);
+        start(d.body_at[index], index);
+      });
+    } else {
+      team.for_each(bodies.count, [&](std::uint32_t i) {
+        const std::uint32_t body = bodies.ids[i].index;
+        d.step.load(body);
+        start(body, body);
+      });
+    }
     place_rows(team);
     place_points(team);
     if (bodies.has_blocks) {
@@ -39,23 +51,38 @@ struct PrepareProgram {
     }
     if (!has_room(team)) return;
     sort_overflow(team);
-    team.for_each_nowait(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
+    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (bodies.movable(body)) sort_fixed(d.index_of(body));
+    });
     team.for_each_nowait(row_count(), [&](std::uint32_t r) { fill_row(r); });
   }
 
  private:
-  /// Initializes a body for the step and its first substep.
-  JFPX_HD void start(std::uint32_t i) const {
+  /// Initializes a body for the first substep.
+  /// @param i     the body, or kNone
+  /// @param index its solver index
+  JFPX_HD void start(std::uint32_t i, std::uint32_t index) const {
     const StepData& d = data;
-    d.step.load(i);
+    const BodyView& bodies = d.step.bodies;
+    d.first_fixed[index] = kNone;
+    if (i == kNone || !bodies.is_active(i)) {
+      d.row_bodies[index] = {};
+      return;
+    }
     soft_step::SolverBody body = d.step.solver[i];
-    const bool is_active = d.step.bodies.is_active(i);
-    d.row_bodies[i] = {is_active ? body.inverse_mass : Real(0), body.inverse_inertia, 0};
-    d.first_fixed[i] = kNone;
+    d.row_bodies[index] = {body.inverse_mass, body.inverse_inertia, 0};
+    d.surfaces[index] = {bodies.radius[i], bodies.friction[i], bodies.restitution[i]};
+    const soft_step::SubstepBody constants = d.step.substep_body(i);
+    d.substep_bodies.store(index, constants);
+    const Quat orientation = d.step.orientation[i];
+    d.orientation[index] = orientation;
     soft_step::FreeMotion free;
-    d.step.accelerate(i, &body, &free, true);
-    d.cells(i).start(body, free);
-    if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], 0);
+    d.step.accelerate(i, constants, orientation, &body, &free, true);
+    d.cells(index).start(body, free);
+    if (constants.has(soft_step::SubstepBody::kHasJoints)) {
+      d.orientation_cells[i].store(orientation, 0);
+    }
   }
 
   /// Assigns a row to each contact and joint, sorted by bin, except those with inner rows.
@@ -81,11 +108,11 @@ struct PrepareProgram {
           const soft_step::ContactKey key = setup.key(i);
           const std::uint32_t group = bin % soft_step::kGroups;
           if (group == soft_step::kFixedGroup) {
-            prepend(&d.first_fixed[setup.movable_body(key)], d.next_fixed, row);
+            prepend(&d.first_fixed[d.index_of(setup.movable_body(key))], d.next_fixed, row);
           } else if (group > 0) {
             const std::uint64_t bit = std::uint64_t{1} << (group - 1);
-            atomic_or(&d.row_bodies[key.a].colors, bit);
-            atomic_or(&d.row_bodies[key.b].colors, bit);
+            atomic_or(&d.row_bodies[d.index_of(key.a)].colors, bit);
+            atomic_or(&d.row_bodies[d.index_of(key.b)].colors, bit);
           }
         });
   }
@@ -128,6 +155,9 @@ struct PrepareProgram {
         rows->next[i / soft_step::kColorsPerClass][i % soft_step::kColorsPerClass] = 0;
       });
       threads.once([&] { rows->points = 0; });
+      const Range places = data.places_of(block);
+      threads.for_each(places.end - places.begin,
+                       [&](std::uint32_t i) { rows->spheres[i] = data.sphere(places.begin + i); });
       threads.sync();
       for_inner_contacts(threads, setup, block,
                          [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
@@ -240,25 +270,29 @@ struct PrepareProgram {
   JFPX_HD void fill_inner(const soft_step::RowSetup& setup, BlockRows* rows, std::uint32_t r,
                           std::uint32_t contact) const {
     const StepData& d = data;
-    const std::uint32_t* place = d.step.bodies.place;
-    const auto fill_in = [&](Row* row) {
-      if constexpr (soft_step::kHasParts<Row>) {
-        row->first = atomic_add(&rows->points, setup.contacts.impulse_count(contact));
-      }
-      typename Row::Part* parts = d.parts_of(*row);
-      setup.template fill<false>(row, parts, contact);
-      if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
-        if (any_rebounds(*row, parts)) d.counters->any_rebound = 1;
-      }
-      InnerBodies{place[row->a] % kBodiesPerBlock, place[row->b] % kBodiesPerBlock, contact}
-          .put_into(row);
+    const auto place_in_block = [&](std::uint32_t body) {
+      return d.step.bodies.place[body] % kBodiesPerBlock;
     };
+    d.row_of[contact] = r;
     if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+      const soft_step::ContactKey& key = setup.contacts.key(contact);
       Row row;
-      fill_in(&row);
+      row.a = place_in_block(key.a);
+      row.b = place_in_block(key.b);
+      setup.template fill<false>(&row, contact, false, rows->spheres[row.a], rows->spheres[row.b]);
       d.sphere_rows.store(r, row);
     } else {
-      fill_in(&d.rows<Row>()[r]);
+      Row& row = d.rows<Row>()[r];
+      if constexpr (soft_step::kHasParts<Row>) {
+        row.first = atomic_add(&rows->points, setup.contacts.impulse_count(contact));
+      }
+      typename Row::Part* parts = d.parts_of(row);
+      setup.template fill<false>(&row, parts, contact);
+      if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
+        if (any_rebounds(row, parts)) d.counters->any_rebound = 1;
+      }
+      row.a = place_in_block(row.a);
+      row.b = place_in_block(row.b);
     }
   }
 
@@ -298,13 +332,13 @@ struct PrepareProgram {
     }
   }
 
-  /// Sorts the rows between a movable body and fixed bodies.
-  JFPX_HD void sort_fixed(std::uint32_t body) const {
+  /// Sorts the rows between a movable body and fixed bodies. @param index solver index
+  JFPX_HD void sort_fixed(std::uint32_t index) const {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();
     const auto order = [&](std::uint32_t row) { return setup.fixed_order(d.row_contact[row]); };
-    d.first_fixed[body] =
-        sort_list(d.first_fixed[body], d.next_fixed,
+    d.first_fixed[index] =
+        sort_list(d.first_fixed[index], d.next_fixed,
                   [&](std::uint32_t x, std::uint32_t y) { return order(x) < order(y); });
   }
 
@@ -320,20 +354,30 @@ struct PrepareProgram {
     constexpr soft_step::RowKind kKind = soft_step::kKindOf<Row>;
     const bool is_fixed =
         r >= d.counters->bin_begin[soft_step::bin_of(kKind, soft_step::kFixedGroup)];
-    const auto fill_in = [&](Row* row) {
-      typename Row::Part* parts = d.parts_of(*row);
-      is_fixed ? setup.fill<true>(row, parts, contact) : setup.fill<false>(row, parts, contact);
-    };
+    d.row_of[contact] = r - first<Row>();
     if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+      const soft_step::ContactKey& key = setup.contacts.key(contact);
+      const bool flipped = setup.is_flipped(key);
+      const std::uint32_t b = flipped ? key.a : key.b;
       Row row;
-      fill_in(&row);
+      row.a = d.index_of(flipped ? key.b : key.a);
+      if (is_fixed) {
+        row.b = b;
+        setup.fill<true>(&row, contact, flipped, d.sphere(row.a), setup.sphere(b));
+      } else {
+        row.b = d.index_of(b);
+        setup.fill<false>(&row, contact, flipped, d.sphere(row.a), d.sphere(row.b));
+      }
       d.sphere_rows.store(r, row);
     } else {
       Row* row = &d.rows<Row>()[r - first<Row>()];
-      fill_in(row);
+      typename Row::Part* parts = d.parts_of(*row);
+      is_fixed ? setup.fill<true>(row, parts, contact) : setup.fill<false>(row, parts, contact);
       if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
-        if (any_rebounds(*row, d.parts_of(*row))) d.counters->any_rebound = 1;
+        if (any_rebounds(*row, parts)) d.counters->any_rebound = 1;
       }
+      row->a = d.index_of(row->a);
+      if (!is_fixed) row->b = d.index_of(row->b);
     }
   }
 

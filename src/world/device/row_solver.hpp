@@ -25,14 +25,12 @@ struct RowSolver {
 
   StepData data;
 
-  /// Accelerations by body, or by place in a block.
+  /// Accelerations of the bodies of rows.
   struct Accelerations {
-    const Vec3* of_body = nullptr;
-    const std::uint32_t* body_at = nullptr;  ///< null: the index is that of a body
+    const StripedArray<soft_step::SubstepBody>& bodies;
+    std::uint32_t first;  ///< solver index of the body of index 0
 
-    JFPX_HD const Vec3& operator[](std::uint32_t i) const {
-      return of_body[body_at != nullptr ? body_at[i] : i];
-    }
+    JFPX_HD Vec3 operator[](std::uint32_t i) const { return bodies.load(first + i).acceleration; }
   };
 
   /// Change of the free motion of both bodies by the impact of a row; see soft_step::ImpactBodies.
@@ -62,7 +60,7 @@ struct RowSolver {
   /// A body of an item: the ticket for which the item waits, and the motion of the body at that
   /// ticket.
   struct ItemBody {
-    std::uint32_t index = 0;
+    std::uint32_t index = 0;              ///< solver index
     std::uint32_t before = 0, after = 0;  ///< tickets
     bool is_ready = false;
     SolverBody motion;
@@ -72,8 +70,8 @@ struct RowSolver {
     JFPX_HD void read(const StepData& step) {
       is_ready = step.cells(index).template read<kRotation>(before, &motion, &version);
     }
-    JFPX_HD void start(std::uint32_t body, const RowBody& constants) {
-      index = body;
+    JFPX_HD void start(std::uint32_t i, const RowBody& constants) {
+      index = i;
       motion.inverse_mass = constants.inverse_mass;
       motion.inverse_inertia = constants.inverse_inertia;
     }
@@ -183,7 +181,7 @@ struct RowSolver {
     visit_row(item->kind, [&](auto type) {
       using Row = typename decltype(type)::type;
       if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
-        solve_spheres(sweep, operation, item);
+        solve_spheres(operation, item);
       } else {
         solve_other<Row>(sweep, operation, item);
       }
@@ -191,11 +189,11 @@ struct RowSolver {
   }
 
   template <class Operation>
-  JFPX_HD void solve_spheres(const Sweep& sweep, const Operation& operation, RowItem* item) const {
+  JFPX_HD void solve_spheres(const Operation& operation, RowItem* item) const {
     soft_step::SphereRow& row = item->sphere;
     const Real restitution = row.restitution;
     const Vec3 shift_a = item->a.motion.shift, shift_b = item->b.motion.shift;
-    const Impact impact{{data.step.bodies.last_acceleration}, row.a};
+    const Impact impact{{data.substep_bodies, 0}, row.a};
     const soft_step::BodyPair pair{&item->a.motion, &item->b.motion, nullptr, nullptr};
     operation.template run<false>(
         &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
@@ -213,7 +211,7 @@ struct RowSolver {
     };
     write(&item->a, shift_a, impact.of_a);
     write(&item->b, shift_b, impact.of_b);
-    store<Operation>(sweep, row, restitution, item->row, 1);  // both bodies are movable
+    if constexpr (Operation::kChangesRow) store_sphere_row(row, restitution, item->row);
   }
 
   template <class Row, class Operation>
@@ -221,16 +219,15 @@ struct RowSolver {
     // Changed in place: a copy would be on the stack of the thread.
     Row& row = data.rows<Row>()[item->row - sweep.first<Row>()];
     const Mat3* inertia = data.step.bodies.inverse_inertia;
-    auto context =
-        context_of(row, soft_step::BodyPair{&item->a.motion, &item->b.motion,
-                                            &inertia[item->a.index], &inertia[item->b.index]});
+    const std::uint32_t a = data.body_of(item->a.index), b = data.body_of(item->b.index);
+    auto context = context_of(
+        row, soft_step::BodyPair{&item->a.motion, &item->b.motion, &inertia[a], &inertia[b]});
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
-      orientation_a = data.orientation_cells[item->a.index].load(sweep.moves());
-      orientation_b = data.orientation_cells[item->b.index].load(sweep.moves());
+      orientation_a = data.orientation_cells[a].load(sweep.moves());
+      orientation_b = data.orientation_cells[b].load(sweep.moves());
       const Quat* start = data.step.bodies.orientation;
-      context.orientations = {&orientation_a, &orientation_b, &start[item->a.index],
-                              &start[item->b.index]};
+      context.orientations = {&orientation_a, &orientation_b, &start[a], &start[b]};
     }
     operation.template run<false>(&row, context);
     const auto write = [&](ItemBody* body) {
@@ -243,7 +240,6 @@ struct RowSolver {
     };
     write(&item->a);
     write(&item->b);
-    store<Operation>(sweep, row, item->row);
   }
 
   /// For a row that does not rebound in the sweeps.
@@ -253,11 +249,30 @@ struct RowSolver {
     return {pair, data.parts_of(row), nullptr};
   }
 
+  /// Ends a substep of a movable body.
+  /// @param index solver index of the body
+  /// @param moves number of moves in the step, with this one
+  JFPX_HD void move(std::uint32_t body, std::uint32_t index, std::uint32_t moves,
+                    SolverBody* motion) const {
+    const StepData& d = data;
+    Quat orientation = d.orientation[index];
+    bool has_joints = false;
+    if constexpr (kKinds > soft_step::kContactRowKinds) {
+      has_joints = d.substep_bodies.load(index).has(soft_step::SubstepBody::kHasJoints);
+    }
+    d.step.move(body, has_joints, &orientation, motion);
+    d.orientation[index] = orientation;
+    if (has_joints) d.orientation_cells[body].store(orientation, moves);
+  }
+
   JFPX_HD void finish_kinematic(std::uint32_t i) const {
     const StepData& d = data;
     if (!d.step.bodies.is_carrier(i)) return;
     SolverBody body = fixed_body(i, 0);
-    for (std::uint32_t k = 0; k < d.substeps; ++k) d.step.move(i, &body);
+    for (std::uint32_t k = 0; k < d.substeps; ++k) {
+      d.step.move(i, d.world_joints.count > 0 && d.step.constrained[i] >= soft_step::kHasJoint,
+                  &d.step.orientation[i], &body);
+    }
     d.step.solver[i].shift = body.shift;
     d.step.solver[i].rotation = body.rotation;
     check_state(i);
@@ -300,7 +315,7 @@ struct RowSolver {
     visit_row(sweep.kind_of(r), [&](auto type) {
       using Row = typename decltype(type)::type;
       if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
-        solve_fixed_spheres(sweep, operation, r, item, free);
+        solve_fixed_spheres(operation, r, item, free);
       } else {
         solve_fixed_other<Row>(sweep, operation, r, item);
       }
@@ -308,12 +323,12 @@ struct RowSolver {
   }
 
   template <class Operation>
-  JFPX_HD void solve_fixed_spheres(const Sweep& sweep, const Operation& operation, std::uint32_t r,
-                                   ItemBody* item, BodyFree* free) const {
+  JFPX_HD void solve_fixed_spheres(const Operation& operation, std::uint32_t r, ItemBody* item,
+                                   BodyFree* free) const {
     soft_step::SphereRow row = data.sphere_rows.load(r);
     const Real restitution = row.restitution;
     SolverBody fixed;  // not read: the body is constant
-    const Impact impact{{data.step.bodies.last_acceleration}, row.a};
+    const Impact impact{{data.substep_bodies, 0}, row.a};
     const soft_step::BodyPair pair{&item->motion, &fixed, nullptr, nullptr};
     operation.template run<true>(
         &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
@@ -322,9 +337,7 @@ struct RowSolver {
       free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
       free->is_changed = true;
     }
-    Real side = 1;
-    if (sweep.stores_impulses && data.row_setup().key(data.row_contact[r]).a != row.a) side = -1;
-    store<Operation>(sweep, row, restitution, r, side);
+    if constexpr (Operation::kChangesRow) store_sphere_row(row, restitution, r);
   }
 
   template <class Row, class Operation>
@@ -332,12 +345,13 @@ struct RowSolver {
                                  ItemBody* item) const {
     Row& row = data.rows<Row>()[r - sweep.first<Row>()];
     SolverBody fixed;
-    const Mat3* inertia = data.step.bodies.inverse_inertia + row.a;
+    const std::uint32_t body = data.body_of(row.a);
+    const Mat3* inertia = data.step.bodies.inverse_inertia + body;
     auto context = context_of(row, soft_step::BodyPair{&item->motion, &fixed, inertia, nullptr});
     Quat orientation_a, orientation_b;
     if constexpr (Row::kReadsOrientation) {
-      orientation_a = data.step.orientation[row.a];
-      context.orientations = {&orientation_a, &orientation_b, &data.step.bodies.orientation[row.a],
+      orientation_a = data.orientation[row.a];
+      context.orientations = {&orientation_a, &orientation_b, &data.step.bodies.orientation[body],
                               nullptr};
     }
     if (!Row::kReadsOrientation || row.b != soft_step::kWorld) {
@@ -345,34 +359,16 @@ struct RowSolver {
       if constexpr (Row::kReadsOrientation) orientation_b = fixed_orientation(row.b, sweep.moves());
     }
     operation.template run<true>(&row, context);
-    store<Operation>(sweep, row, r);
   }
 
   /// Stores the changes of a row by an operation.
   /// @param restitution before the operation
-  /// @param side        see RowSetup::store()
-  template <class Operation>
-  JFPX_HD void store(const Sweep& sweep, const soft_step::SphereRow& row, Real restitution,
-                     std::uint32_t r, Real side) const {
-    if constexpr (Operation::kChangesRow) {
-      store_sphere_row(row, restitution, r);
-      if (sweep.stores_impulses) data.row_setup().store(row, nullptr, data.row_contact[r], side);
-    }
-  }
   JFPX_HD void store_sphere_row(const soft_step::SphereRow& row, Real restitution,
                                 std::uint32_t r) const {
     using Row = soft_step::SphereRow;
     data.sphere_rows.store_bytes<0, offsetof(Row, normal)>(r, row);
     if (restitution != row.restitution) {
       data.sphere_rows.store_bytes<offsetof(Row, restitution), offsetof(Row, a)>(r, row);
-    }
-  }
-  template <class Operation, class Row>
-  JFPX_HD void store(const Sweep& sweep, const Row& row, std::uint32_t r) const {
-    if constexpr (Operation::kChangesRow) {
-      if (sweep.stores_impulses) {
-        data.row_setup().store(row, data.parts_of(row), data.row_contact[r]);
-      }
     }
   }
 };

@@ -23,10 +23,10 @@ class ScratchBuffers {
     d.swept_bounds.motion = d.motion;
     d.first_candidate = transfer.room(&first_candidate_, n);
     d.manifold_sizes = transfer.room(&manifold_sizes_, n);
-    d.first_fixed = transfer.room(&first_fixed_, n);
     d.used_colors = transfer.room(&used_colors_, n);
     may_have_blocks_ = n > BodyStore::most_in_one_block;
     if (may_have_blocks_) reserve_blocks(transfer, n, data);
+    reserve_solver(transfer, may_have_blocks_ ? index_count(n) : n, data);
     d.first_order = transfer.room(&first_order_, n);
     d.first_contact = transfer.room(&first_contact_, n);
     d.parent = transfer.room(&parent_, n);
@@ -36,12 +36,14 @@ class ScratchBuffers {
     d.step.solver = transfer.room(&solver_, n);
     d.step.traits = transfer.room(&traits_, n);
     d.step.orientation = transfer.room(&orientation_, n);
-    d.motion_cells = transfer.room(&motion_cells_, n);
-    d.codes = codes_in(d.motion_cells, n);
-    d.free_cells = transfer.room(&free_cells_, n);
-    d.row_bodies = transfer.room(&row_bodies_, n);
+    d.codes = codes_in(d.columns.cells, n);
     d.pair_count = transfer.room(&pair_count_, 1);
     d.counters = transfer.room(&counters_, 1);
+  }
+
+  /// Orientations during a step, by solver index.
+  Quat* orientation_of_step(const StepData& data) {
+    return data.step.bodies.has_blocks ? orientation_by_index_.data() : data.step.orientation;
   }
 
   /// Reserves the arrays indexed by sub-shape. @param n number of sub-shapes without walls
@@ -63,6 +65,7 @@ class ScratchBuffers {
     d.next_candidate = transfer.room(&next_candidate_, c.candidates);
     d.uncolored = transfer.room(&uncolored_, rows);
     d.still_uncolored = transfer.room(&still_uncolored_, rows);
+    d.row_of = d.uncolored;
     d.row_bins = transfer.room(&row_bins_, rows);
     d.row_contact = transfer.room(&row_contact_, rows);
     d.next_fixed = transfer.room(&next_fixed_, rows);
@@ -85,20 +88,36 @@ class ScratchBuffers {
   }
 
  private:
+  /// Number of solver indices of a world with blocks: the places of all slots, and as many bodies
+  /// without a place, from the next block on. @param n number of slots
+  static std::size_t index_count(std::size_t n) { return 2 * n + kBodiesPerBlock; }
+
+  /// Reserves the arrays by solver index. @param n number of indices
+  void reserve_solver(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
+    StepData& d = *data;
+    d.columns = {transfer.room(&cells_, n * CellColumns::kColumns), n};
+    d.row_bodies = transfer.room(&row_bodies_, n);
+    d.surfaces = transfer.room(&surfaces_, n);
+    d.substep_bodies = {transfer.room(&substep_bodies_, n), n};
+    d.first_fixed = transfer.room(&first_fixed_, n);
+  }
+
   /// Reserves the arrays of worlds with several blocks. @param n number of slots
   void reserve_blocks(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
-    // The places of all slots, and as many bodies without a place, from the next block on.
-    d.body_at = transfer.room(&body_at_, 2 * n + kBodiesPerBlock);
+    d.body_at = transfer.room(&body_at_, index_count(n));
+    d.solver_index = transfer.room(&solver_index_, n);
+    transfer.room(&orientation_by_index_, index_count(n));
     const std::size_t blocks = n / kBodiesPerBlock + 1;
     constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
     d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds);
     d.first_inner_joint = transfer.room(&first_inner_joint_, blocks);
   }
 
-  static SortedCodes codes_in(MotionCells* memory, std::size_t n) {
+  static SortedCodes codes_in(VectorCells* memory, std::size_t n) {
     SortedCodes codes;
-    static_assert(sizeof(MotionCells) >= 2 * (sizeof(*codes.keys) + sizeof(*codes.items)));
+    static_assert(CellColumns::kColumns * sizeof(VectorCells) >=
+                  2 * (sizeof(*codes.keys) + sizeof(*codes.items)));
     codes.keys = reinterpret_cast<std::uint64_t*>(memory);
     codes.other_keys = codes.keys + n;
     codes.items = reinterpret_cast<std::uint32_t*>(codes.other_keys + n);
@@ -119,19 +138,20 @@ class ScratchBuffers {
   Buffer<CandidateManifold> tested_;
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_, body_at_,
-      inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_;
+      solver_index_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_;
   Buffer<soft_step::UsedColors> used_colors_;
   Buffer<std::uint64_t> manifold_sizes_, first_order_;
   Buffer<std::uint8_t> pair_found_, marked_, constrained_, traits_;
   Buffer<std::uint16_t> row_bins_;
   Buffer<soft_step::SolverBody> solver_;
-  Buffer<Quat> orientation_;
+  Buffer<Quat> orientation_, orientation_by_index_;
   Buffer<soft_step::SphereRow> sphere_rows_;
   Buffer<soft_step::ManifoldRow> manifold_rows_;
   Buffer<soft_step::PointRow> point_rows_;
-  Buffer<MotionCells> motion_cells_;
-  Buffer<FreeCells> free_cells_;
+  Buffer<VectorCells> cells_;
   Buffer<RowBody> row_bodies_;
+  Buffer<Surface> surfaces_;
+  Buffer<soft_step::SubstepBody> substep_bodies_;
   Buffer<Counters> counters_;
   bool may_have_blocks_ = false;  ///< whether the world may get several blocks
 };

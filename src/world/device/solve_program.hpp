@@ -52,18 +52,15 @@ struct SolveProgram : RowSolver<kKinds> {
       run(team, sweep, soft_step::Solve<true>{d.constants});
       for (std::uint32_t k = 1; k <= soft_step::kRelaxSweeps; ++k) {
         const bool ends_substep = k == soft_step::kRelaxSweeps;
-        const bool ends_step = is_last && ends_substep;
         sweep.start(!ends_substep ? BodyStage::none
                     : !is_last    ? BodyStage::accelerate
                     : rebounds    ? BodyStage::none
                                   : BodyStage::finish);
-        sweep.stores_impulses = ends_step;
         run(team, sweep, soft_step::Solve<false>{d.constants});
       }
     }
     if (!rebounds) return;
     sweep.start(BodyStage::finish);
-    sweep.stores_impulses = false;
     run(team, sweep, soft_step::Restitute{});
   }
 
@@ -119,7 +116,7 @@ struct SolveProgram : RowSolver<kKinds> {
     const StepData& d = data;
     const RowBody constants = d.row_bodies[body];
     item->start(body, constants);
-    item->is_active = constants.inverse_mass > 0 && d.step.bodies.awake[body] != 0;
+    item->is_active = constants.inverse_mass > 0;
     item->first_fixed = d.first_fixed[body];
     const Tickets tickets(sweep.number, constants.colors);
     item->before = tickets.last();
@@ -148,14 +145,11 @@ struct SolveProgram : RowSolver<kKinds> {
       return;
     }
     if (sweep.stage == BodyStage::move) {
-      d.step.move(i, &body);
-      if constexpr (kKinds > soft_step::kContactRowKinds) {
-        if (d.is_joined(i)) d.orientation_cells[i].store(d.step.orientation[i], sweep.moves() + 1);
-      }
+      this->move(i, i, sweep.moves() + 1, &body);
     }
     if (sweep.stage == BodyStage::accelerate) {
       free.read(cells, item->version);
-      d.step.accelerate(i, &body, &free.motion, false);
+      d.step.accelerate(i, d.substep_bodies.load(i), d.orientation[i], &body, &free.motion, false);
       free.is_changed = true;
     }
     cells.write_shift(body, &item->version);

@@ -149,6 +149,12 @@ struct DeviceJoints {
   std::uint32_t of_kind[soft_step::kRowKinds - soft_step::kContactRowKinds] = {};
 };
 
+/// What rows of spheres read of a body besides RowBody.
+struct alignas(4 * sizeof(Real)) Surface {
+  Real radius = 0;  ///< [m]
+  Real friction = 0, restitution = 0;
+};
+
 /// Arrays that are sorted by key, and as much memory for the sort.
 struct SortedCodes {
   std::uint64_t *keys = nullptr, *other_keys = nullptr;
@@ -181,14 +187,19 @@ struct StepData {
   std::uint64_t* manifold_sizes = nullptr;
 
   /// The movable bodies by place, with kNone in unused places, then from first_without_place() on
-  /// the bodies without a place.
+  /// the bodies without a place. The solver index of a body is its index in this array, so that the
+  /// bodies of a block are neighbors in memory. In a world of one block, it is that of the body.
   std::uint32_t* body_at = nullptr;
+  std::uint32_t* solver_index = nullptr;  ///< by body, of movable bodies in a world with blocks
 
   soft_step::UsedColors* used_colors = nullptr;  ///< by body
   /// By body: lowest color_order() of its uncolored contacts, and the lowest of those contacts.
   std::uint64_t* first_order = nullptr;
   std::uint32_t* first_contact = nullptr;
   std::uint32_t *uncolored = nullptr, *still_uncolored = nullptr;
+  /// By contact or joint that has a row: the number of the row in its kind. In the memory of
+  /// `uncolored`, which is not in use when rows are built.
+  std::uint32_t* row_of = nullptr;
 
   std::uint32_t* parent = nullptr;      ///< by body, of the islands
   std::uint8_t* marked = nullptr;       ///< by label of an island
@@ -203,7 +214,7 @@ struct StepData {
   soft_step::PointRow* point_rows = nullptr;
   soft_step::DistanceRow* distance_rows = nullptr;
   soft_step::FrameRow* frame_rows = nullptr;
-  std::uint32_t* first_fixed = nullptr;  ///< by body: list of its rows with fixed bodies
+  std::uint32_t* first_fixed = nullptr;  ///< by solver index: list of its rows with fixed bodies
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
   /// By block, kind and color: the first inner row, as a number in its kind; see inner_begin().
   std::uint32_t* inner_rows = nullptr;
@@ -212,12 +223,16 @@ struct StepData {
   std::uint32_t* next_inner_joint = nullptr;   ///< by joint
   /// The overflow rows: by kind, then in the order of contacts.
   std::uint32_t* overflow = nullptr;
-  MotionCells* motion_cells = nullptr;            ///< by body
-  FreeCells* free_cells = nullptr;                ///< by body
-  RowBody* row_bodies = nullptr;                  ///< by body
+  CellColumns columns;                                  ///< by solver index
+  RowBody* row_bodies = nullptr;                        ///< by solver index
+  Surface* surfaces = nullptr;                          ///< by solver index
+  StripedArray<soft_step::SubstepBody> substep_bodies;  ///< by solver index
+  /// By solver index: the orientation during the step, of movable bodies. In a world of one block,
+  /// it is step.orientation.
+  Quat* orientation = nullptr;
   OrientationCells* orientation_cells = nullptr;  ///< by body, of bodies with joints
   SavedColumns<PointerColumn> saved;              ///< values at the start of the step
-  /// By body. In the memory of motion_cells, which are not in use when the partition is renewed.
+  /// By body. In the memory of `columns`, which are not in use when the partition is renewed.
   SortedCodes codes;
 
   /// The rows of a kind other than spheres, by their number in this kind.
@@ -230,6 +245,15 @@ struct StepData {
     } else {
       static_assert(std::is_same_v<Row, soft_step::FrameRow>);
       return frame_rows;
+    }
+  }
+  /// A row of any kind by its number in this kind.
+  template <class Row>
+  JFPX_HD decltype(auto) row(std::uint32_t number) const {
+    if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
+      return sphere_rows.load(number);
+    } else {
+      return (rows<Row>()[number]);
     }
   }
   /// The parts of a row; null if it has none.
@@ -269,9 +293,28 @@ struct StepData {
     return inner_rows + (block * soft_step::kRowKinds + kind) * kStride;
   }
 
-  JFPX_HD BodyCells cells(std::uint32_t body) const {
-    return {&motion_cells[body], &free_cells[body]};
+  /// Solver index of a movable body, and the reverse.
+  JFPX_HD std::uint32_t index_of(std::uint32_t body) const {
+    return step.bodies.has_blocks ? solver_index[body] : body;
   }
+  JFPX_HD std::uint32_t body_of(std::uint32_t index) const {
+    return step.bodies.has_blocks ? body_at[index] : index;
+  }
+  /// Number of solver indices in a world with blocks, some of which may be of no body.
+  JFPX_HD std::uint32_t index_count() const { return counters->places + counters->without_place; }
+  JFPX_HD std::uint32_t solver_index_of(std::uint32_t number) const {
+    const std::uint32_t places = counters->places;
+    return number < places ? number : first_without_place() + (number - places);
+  }
+  /// @param index solver index
+  JFPX_HD soft_step::RowSetup::Sphere sphere(std::uint32_t index) const {
+    const RowBody& body = row_bodies[index];
+    const Surface& surface = surfaces[index];
+    return {body.inverse_mass, body.inverse_inertia, surface.radius, surface.friction,
+            surface.restitution};
+  }
+  /// @param index solver index
+  JFPX_HD BodyCells cells(std::uint32_t index) const { return {columns, index}; }
   /// The contacts of the step in progress, and those of the last completed step. The device selects
   /// them, because the host does not track the number of completed steps.
   JFPX_HD const DeviceContacts& now() const { return contacts_of[parity()]; }
@@ -314,10 +357,6 @@ struct StepData {
   /// Number of sweeps over joints in a substep.
   JFPX_HD std::uint32_t joint_sweeps() const {
     return world_joints.count > 0 ? constants.joint_sweeps : 0;
-  }
-  /// Whether a body has joints, once MatchProgram is complete.
-  JFPX_HD bool is_joined(std::uint32_t body) const {
-    return world_joints.count > 0 && constrained[body] >= soft_step::kHasJoint;
   }
   JFPX_HD soft_step::Islands islands() const {
     return {.step = step,

@@ -57,8 +57,6 @@ struct SweepList {
     if (in_substep(sweep) == 0) return BodyStage::accelerate;
     return in_substep(sweep) == joint_sweeps + 1 ? BodyStage::move : BodyStage::none;
   }
-  /// Whether a sweep stores the final impulses of the rows.
-  JFPX_HD bool stores_impulses(std::uint32_t sweep) const { return sweep + 1 == end_of_substeps(); }
   /// Number of moves of the bodies before the rows of a sweep are solved.
   JFPX_HD std::uint32_t moves(std::uint32_t sweep) const {
     return (sweep + soft_step::kRelaxSweeps - 1) / per_substep();
@@ -80,7 +78,6 @@ struct Sweep {
   std::uint32_t colored_items = 0;  ///< number of items for all rows of colors
   std::uint32_t number = 0;
   BodyStage stage = BodyStage::none;  ///< after the rows; not used by BlockSolveProgram
-  bool stores_impulses = false;       ///< whether this sweep stores the final impulses of the rows
 
   JFPX_HD Sweep(const std::uint32_t* bins, const SweepList& all) : begin(bins), sweeps(all) {
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {

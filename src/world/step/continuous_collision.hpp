@@ -36,19 +36,20 @@ struct ContinuousCollision {
   template <class Team, class Mobile>
   JFPX_HD void run(const Team& team, std::uint32_t count, const Mobile& mobile,
                    std::uint32_t* any_fast) const {
-    /// Replaces the traits of a body, which are no longer in use.
+    /// A bit of the traits of a body that BodyTraits does not have.
     constexpr std::uint8_t kFast = 0x80;
     const SubShapeRanges& ranges = sub_shapes.ranges;
     if (ranges.fixed_begin() == ranges.all()) return;
     team.for_each(ranges.fixed_begin(), [&](std::uint32_t i) {
       if (!is_fast(i)) return;
-      store_shared(&step.traits[sub_shapes.body(i)], kFast);
+      std::uint8_t* const traits = &step.traits[sub_shapes.body(i)];
+      store_shared(traits, static_cast<std::uint8_t>(load_shared(traits) | kFast));
       store_shared(any_fast, 1);
     });
     if (*any_fast == 0) return;
     team.for_each(count, [&](std::uint32_t i) {
       const std::uint32_t body = mobile(i);
-      if (bodies().is_active(body) && step.traits[body] == kFast) stop(body);
+      if (bodies().is_active(body) && (step.traits[body] & kFast) != 0) stop(body);
     });
   }
 

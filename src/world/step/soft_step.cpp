@@ -214,7 +214,9 @@ void SoftStep::run_substeps(const BodyStore& bodies) {
   using soft_step::Sweep;
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
     for_each_body(bodies, [&](std::uint32_t i) {
-      step_.accelerate(i, &step_.solver[i], &free_[i], substep == 0);
+      if (!step_.bodies.is_active(i)) return;
+      step_.accelerate(i, step_.substep_body(i), step_.orientation[i], &step_.solver[i], &free_[i],
+                       substep == 0);
     });
     if (substep == 0) solver_.sweep(Sweep::warm_start);
     if (joints_.count > 0) {
@@ -222,7 +224,11 @@ void SoftStep::run_substeps(const BodyStore& bodies) {
       for (std::uint32_t k = 1; k < constants_.joint_sweeps; ++k) solver_.sweep(Sweep::joints);
     }
     solver_.sweep(Sweep::bias);
-    for_each_body(bodies, [this](std::uint32_t i) { step_.move(i, &step_.solver[i]); });
+    for_each_body(bodies, [this](std::uint32_t i) {
+      if (step_.bodies.awake[i] == 0) return;
+      const bool has_joints = step_.constrained[i] >= soft_step::kHasJoint;
+      step_.move(i, has_joints, &step_.orientation[i], &step_.solver[i]);
+    });
     for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.sweep(Sweep::relax);
   }
   if (solver_.needs_restitution()) solver_.sweep(Sweep::restitution);

@@ -52,6 +52,22 @@ JFPX_HD inline void with_joined_bodies(const JointView& joints, std::uint32_t jo
   f(joints.inputs[joint].a, joints.inputs[joint].b);
 }
 
+/// What the substeps read of an active body. It is constant during a step.
+struct alignas(16) SubstepBody {
+  /// Bits of `flags`.
+  static constexpr std::uint32_t kIsFree = 1;  ///< the body has neither contacts nor joints
+  static constexpr std::uint32_t kHasForce = 2, kHasJoints = 4, kIsGyroscopic = 8;
+
+  Vec3 acceleration;          ///< [m/s^2], of the step
+  Real velocity_kept = 1;     ///< [-], by damping, per substep
+  Vec3 angular_acceleration;  ///< [rad/s^2]
+  Real angular_velocity_kept = 1;
+  std::uint32_t flags = 0;
+  std::uint32_t unused[3] = {};  ///< instead of padding
+
+  JFPX_HD bool has(std::uint32_t flag) const { return (flags & flag) != 0; }
+};
+
 /// The bodies of a step, as arrays by body.
 struct StepBodies {
   BodyView bodies;
@@ -91,22 +107,44 @@ struct StepBodies {
     return bits;
   }
 
+  /// @param i an active body, for which load() was called
+  JFPX_HD SubstepBody substep_body(std::uint32_t i) const {
+    SubstepBody body;
+    body.acceleration = bodies.last_acceleration[i];
+    body.velocity_kept = bodies.velocity_kept[i];
+    body.angular_acceleration = bodies.angular_acceleration_of_step(i);
+    body.angular_velocity_kept = bodies.angular_velocity_kept[i];
+    if (constrained[i] == 0) body.flags |= SubstepBody::kIsFree;
+    if (!(bodies.force[i] == Vec3{})) body.flags |= SubstepBody::kHasForce;
+    if (constrained[i] >= kHasJoint) body.flags |= SubstepBody::kHasJoints;
+    if (bodies.has_gyroscopic_term(i)) body.flags |= SubstepBody::kIsGyroscopic;
+    return body;
+  }
+
   /// Starts a substep: applies accelerations and, except in the first substep, the contact impulses
   /// of the last substep. A body without contacts moves by the mean of its velocities before and
   /// after, so its path is an exact parabola. With contacts, the mean would contain acceleration
   /// that the impulses have cancelled. Forces, which may depend on the position, are constant in a
   /// step and integrated by semi-implicit Euler over the whole step; otherwise springs would gain
   /// energy.
-  JFPX_HD void accelerate(std::uint32_t i, SolverBody* body, FreeMotion* free,
+  /// @param i               an active body
+  /// @param constants       substep_body(i)
+  /// @param orientation_now at the start of the substep
+  JFPX_HD void accelerate(std::uint32_t i, const SubstepBody& constants,
+                          const Quat& orientation_now, SolverBody* body, FreeMotion* free,
                           bool is_first) const {
-    if (!bodies.is_active(i)) return;
-    Vec3 velocity = body->velocity, angular_velocity = body->angular_velocity;
-    bodies.accelerate(i, orientation[i], &velocity, &angular_velocity);
-    if (constrained[i] == 0) {
+    const Vec3 velocity = detail::integrated_velocity(body->velocity, constants.acceleration, h,
+                                                      constants.velocity_kept);
+    Vec3 angular_velocity = detail::integrated_velocity(
+        body->angular_velocity, constants.angular_acceleration, h, constants.angular_velocity_kept);
+    if (constants.has(SubstepBody::kIsGyroscopic)) {
+      bodies.turn_gyroscopically(i, orientation_now, &angular_velocity);
+    }
+    if (constants.has(SubstepBody::kIsFree)) {
       body->shift = add_scaled(body->shift, body->velocity - velocity, h * Real(0.5));
-      if (!(bodies.force[i] == Vec3{})) {
+      if (constants.has(SubstepBody::kHasForce)) {
         const Real half_step = h * bodies.dt * Real(0.5);
-        body->shift = add_scaled(body->shift, bodies.last_acceleration[i], half_step);
+        body->shift = add_scaled(body->shift, constants.acceleration, half_step);
       }
     }
     const Vec3 gained = is_first ? Vec3{} : body->velocity - free->velocity;
@@ -117,16 +155,19 @@ struct StepBodies {
   }
 
   /// Ends a substep: integrates the velocities of a body that moves.
-  JFPX_HD void move(std::uint32_t i, SolverBody* body) const {
-    if (bodies.awake[i] == 0) return;
+  /// @param i               an awake body
+  /// @param has_joints      whether rows of joints project its rotation
+  /// @param orientation_now changes
+  JFPX_HD void move(std::uint32_t i, bool has_joints, Quat* orientation_now,
+                    SolverBody* body) const {
     body->shift = add_scaled(body->shift, body->velocity, h);
-    orientation[i] = turned(orientation[i], *body);
-    if (constrained[i] >= kHasJoint) {
+    *orientation_now = turned(*orientation_now, *body);
+    if (has_joints) {
       const Vec3 projected = body->rotation - moved_rotation[i];
-      if (!(projected == Vec3{})) orientation[i] = rotated_by(orientation[i], projected);
+      if (!(projected == Vec3{})) *orientation_now = rotated_by(*orientation_now, projected);
     }
     body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
-    if (constrained[i] >= kHasJoint) moved_rotation[i] = body->rotation;
+    if (has_joints) moved_rotation[i] = body->rotation;
   }
 
   /// The orientation of a body after a substep. An overflow makes it zero until the step is undone.
