@@ -482,6 +482,49 @@ TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
   }
 }
 
+/// Inner rows of all kinds in blocks that do not start at place 0, holes in blocks, and more bodies
+/// without a place than a partition that is not due leaves.
+TEST_P(DeviceWorldTest, SeveralBlocksOfBodiesHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  constexpr std::uint32_t kBodies = soft_step::kBodiesPerBlock + 150, kRow = 11;
+  std::uint32_t number = 0;
+  const auto next_body = [&] {
+    BodyDef def = test::random_body(&random, 1);
+    while (def.mass == 0) def = test::random_body(&random, 1);
+    const std::uint32_t i = number++ % kBodies;
+    def.position = Vec3{static_cast<Real>(i % kRow), static_cast<Real>(i / kRow / kRow),
+                        static_cast<Real>(i / kRow % kRow)} *
+                   1.5_r;
+    def.velocity = random.uniform_in_box({-3, -3, -3}, {3, 3, 3});
+    def.restitution = random.uniform(0, 1);
+    return def;
+  };
+  Scene scene;
+  for (std::uint32_t i = 0; i < kBodies; ++i) scene.bodies.push_back(next_body());
+  scene.bodies.push_back(test::half_space({0, 1, 0}, -1));
+  test::add_random_joints(&random, &scene);
+  World host = on_host(scene), device = on_device(scene);
+  const auto step = [&](int steps) {
+    for (int n = 0; n < steps; ++n) {
+      host.step(), device.step();
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << host.steps();
+    }
+  };
+  ASSERT_NO_FATAL_FAILURE(step(3));
+  for (std::uint32_t i = 0; i + 100 < kBodies; ++i) {
+    const std::uint64_t removed = random.below(kBodies);
+    const BodyDef def = next_body();
+    for (World* world : {&host, &device}) {
+      world->remove(world->bodies()[removed]);
+      world->add(def);
+    }
+  }
+  ASSERT_NO_FATAL_FAILURE(step(3));
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+}
+
 /// A body in the slot of a removed one does not take over its impulses or its neighbors.
 TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
   const Scene scene = scenes::make("tower", {});

@@ -17,7 +17,8 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 
 /// All types of rows. Rows of the overflow are solved in this order of kinds. A type has:
-///   - `a`, `b`: its bodies, of which a is movable;
+///   - `a`, `b`: its bodies, of which a is movable. On a device, the sweeps and the storage of
+///     impulses see other numbers here (see device::RowSolver), and must not index arrays by them;
 ///   - `Part`: type of the repeated parts of a row, or NoPart. A row with parts has the index
 ///     `first` of its first part, and their number `count`;
 ///   - `kReadsRotation`: whether a row reads and changes SolverBody::rotation; `kReadsOrientation`:

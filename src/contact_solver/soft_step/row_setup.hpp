@@ -21,6 +21,9 @@ struct BodyTraits {
   /// A movable sphere with the same inertia about every axis, or a body of mass 0 that is at rest.
   static constexpr std::uint8_t kIsRound = 4;
   static constexpr std::uint8_t kRolls = 8;  ///< has rolling or spinning friction
+  /// Continuous collision must test the body. Set at the end of the step, while other threads read
+  /// the other bits.
+  static constexpr std::uint8_t kIsFast = 0x80;
 };
 
 /// Properties of the bodies at the start of a step, as arrays by body.
@@ -120,13 +123,13 @@ struct RowSetup {
   }
 
   /// What a SphereRow reads of a body.
-  struct Sphere {
+  struct SphereProperties {
     Real inverse_mass = 0;     ///< as SolverBody
     Real inverse_inertia = 0;  ///< as SolverBody
     Real radius = 0;           ///< [m]
     Real friction = 0, restitution = 0;
   };
-  JFPX_HD Sphere sphere(std::uint32_t body) const {
+  JFPX_HD SphereProperties sphere(std::uint32_t body) const {
     return {start[body].inverse_mass, start[body].inverse_inertia, properties.radius[body],
             properties.friction[body], properties.restitution[body]};
   }
@@ -142,8 +145,8 @@ struct RowSetup {
   /// fill() without the numbers of the bodies.
   /// @param flipped is_flipped()
   template <bool kFixed>
-  JFPX_HD void fill(SphereRow* row, std::uint32_t contact, bool flipped, const Sphere& a,
-                    const Sphere& b) const {
+  JFPX_HD void fill(SphereRow* row, std::uint32_t contact, bool flipped, const SphereProperties& a,
+                    const SphereProperties& b) const {
     const Real distance = contacts.distance(contact, 0);
     const Vec3& normal = contacts.normal(contact);
     const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact)];

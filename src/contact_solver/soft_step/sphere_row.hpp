@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 
 /// Aligned, so that a device reads and writes it in few accesses. A sweep changes only the fields
-/// before `normal`, and `restitution`: device::SolveProgram::store() writes only these.
+/// before `normal`, and `restitution`: device::RowSolver::store_sphere_row() writes only these.
 struct alignas(4 * sizeof(Real)) SphereRow {
   using Part = NoPart;
   static constexpr bool kReadsRotation = false, kReadsOrientation = false;

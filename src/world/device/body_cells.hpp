@@ -255,7 +255,7 @@ class BodyCells {
 
 /// Constants of a body during a step, for its rows.
 struct alignas(16) RowBody {
-  Real inverse_mass = 0;     ///< as SolverBody; 0 if the body is asleep
+  Real inverse_mass = 0;     ///< as SolverBody; 0: not a movable awake body
   Real inverse_inertia = 0;  ///< as SolverBody
   std::uint64_t colors = 0;  ///< of its rows
 };

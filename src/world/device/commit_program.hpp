@@ -11,8 +11,9 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Ends the step: stops bodies at walls, moves the bodies, clears forces, and puts islands to
-/// sleep. If the step cannot be completed or a body has left the world, it only counts the step.
+/// Ends the step: stores the impulses of the rows by contact, stops bodies at walls, moves the
+/// bodies, clears forces, and puts islands to sleep. If the step cannot be completed or a body has
+/// left the world, it only counts the step.
 struct CommitProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kCommit;
   StepData data;

@@ -25,7 +25,7 @@ struct BoundsProgram {
     if (!is_started) start_counters(team, d);
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
     if (bodies.has_blocks && d.world_joints.count > 0) {
-      team.for_each_nowait(d.first_without_place() / kBodiesPerBlock,
+      team.for_each_nowait((bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock,
                            [&](std::uint32_t block) { d.first_inner_joint[block] = kNone; });
     }
     team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
@@ -60,14 +60,13 @@ struct BoundsProgram {
   JFPX_HD void put_into_block(std::uint32_t body) const {
     const StepData& d = data;
     const std::uint32_t place = d.step.bodies.place[body];
-    std::uint32_t index = place;
     if (place == soft_step::kNoPlace) {
-      index = d.first_without_place() + atomic_add(&d.counters->without_place, 1);
+      d.unplaced[atomic_add(&d.counters->without_place, 1)] = body;
     } else {
+      d.body_at[place] = body;
+      d.solver_index[body] = place;
       raise(&d.counters->places, place + 1);
     }
-    d.body_at[index] = body;
-    d.solver_index[body] = index;
   }
 
   JFPX_HD void start(std::uint32_t body) const {

@@ -402,7 +402,6 @@ class DeviceStep final : public DeviceWorld {
   void make_room() {
     if (is_ready_) return;
     const std::uint64_t moves = transfer_.moves();
-    data_.capacity = capacity_;
     scratch_.reserve_lists(transfer_, capacity_, &data_);
     for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
     use_contacts();

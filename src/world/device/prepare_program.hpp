@@ -17,7 +17,7 @@ struct PrepareProgram {
     std::uint32_t next[soft_step::kRowKinds][soft_step::kColorsPerClass];
     std::uint32_t points;  ///< of manifolds: their number, then the next one
     bool has_room[soft_step::kRowKinds];
-    soft_step::RowSetup::Sphere spheres[kBodiesPerBlock];  ///< by place in the block
+    soft_step::RowSetup::SphereProperties spheres[kBodiesPerBlock];  ///< by place in the block
   };
 
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kPrepare;
@@ -31,11 +31,16 @@ struct PrepareProgram {
     const BodyView& bodies = d.step.bodies;
     if (d.counters->any_asleep != 0) d.islands().wake_touched(team);
     if (bodies.has_blocks) {
-      team.for_each(bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); });
-      team.for_each(d.index_count(), [&](std::uint32_t i) {
-        const std::uint32_t index = d.solver_index_of(i);
-        start(d.body_at[index], index);
+      if (!has_indices(team)) return;
+      const std::uint32_t first = d.first_without_place();
+      team.for_each_nowait(first - d.counters->places,
+                           [&](std::uint32_t i) { d.body_at[d.counters->places + i] = kNone; });
+      team.for_each_nowait(d.counters->without_place, [&](std::uint32_t i) {
+        d.body_at[first + i] = d.unplaced[i];
+        d.solver_index[d.unplaced[i]] = first + i;
       });
+      team.for_each(bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); });
+      team.for_each(d.index_count(), [&](std::uint32_t i) { start(d.body_at[i], i); });
     } else {
       team.for_each(bodies.count, [&](std::uint32_t i) {
         const std::uint32_t body = bodies.ids[i].index;
@@ -68,11 +73,12 @@ struct PrepareProgram {
     d.first_fixed[index] = kNone;
     if (i == kNone || !bodies.is_active(i)) {
       d.row_bodies[index] = {};
+      d.balls[index] = {};
       return;
     }
     soft_step::SolverBody body = d.step.solver[i];
     d.row_bodies[index] = {body.inverse_mass, body.inverse_inertia, 0};
-    d.surfaces[index] = {bodies.radius[i], bodies.friction[i], bodies.restitution[i]};
+    d.balls[index] = {bodies.radius[i], bodies.friction[i], bodies.restitution[i]};
     const soft_step::SubstepBody constants = d.step.substep_body(i);
     d.substep_bodies.store(index, constants);
     const Quat orientation = d.step.orientation[i];
@@ -294,6 +300,18 @@ struct PrepareProgram {
       row.a = place_in_block(row.a);
       row.b = place_in_block(row.b);
     }
+  }
+
+  /// @returns whether all solver indices of a world with blocks fit into memory
+  template <class Team>
+  JFPX_HD bool has_indices(const Team& team) const {
+    const StepData& d = data;
+    if (d.index_count() <= d.capacity.indices) return true;
+    team.once([&] {
+      d.counters->needed.indices = d.index_count();
+      d.counters->failed = 1;
+    });
+    return false;
   }
 
   /// @returns whether the rows of manifolds and their points fit into memory

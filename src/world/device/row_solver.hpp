@@ -17,6 +17,9 @@ namespace device {
 /// Solves the rows of the overflow, of colors and with fixed bodies. Rows of colors exchange the
 /// motion of their bodies through BodyCells: a row waits only for the earlier rows of its two
 /// bodies (see Tickets).
+///
+/// `a` and `b` of a row are places in a block (inner rows) or solver indices; `b` of a row with a
+/// fixed body is that body, or kWorld.
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program with
 ///   fewer kinds needs fewer registers
 template <soft_step::RowKind kKinds>

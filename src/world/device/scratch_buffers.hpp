@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/world/bodies/body_store.hpp"
+#include "src/world/bodies/partition.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/transfer.hpp"
 
@@ -26,7 +27,7 @@ class ScratchBuffers {
     d.used_colors = transfer.room(&used_colors_, n);
     may_have_blocks_ = n > BodyStore::most_in_one_block;
     if (may_have_blocks_) reserve_blocks(transfer, n, data);
-    reserve_solver(transfer, may_have_blocks_ ? index_count(n) : n, data);
+    slots_ = n;
     d.first_order = transfer.room(&first_order_, n);
     d.first_contact = transfer.room(&first_contact_, n);
     d.parent = transfer.room(&parent_, n);
@@ -36,7 +37,6 @@ class ScratchBuffers {
     d.step.solver = transfer.room(&solver_, n);
     d.step.traits = transfer.room(&traits_, n);
     d.step.orientation = transfer.room(&orientation_, n);
-    d.codes = codes_in(d.columns.cells, n);
     d.pair_count = transfer.room(&pair_count_, 1);
     d.counters = transfer.room(&counters_, 1);
   }
@@ -52,9 +52,13 @@ class ScratchBuffers {
     data->swept_bounds.swept = transfer.room_to_grow(&swept_, n);
   }
 
-  /// Reserves the lists.
-  void reserve_lists(const Transfer<Device>& transfer, const Capacity& c, StepData* data) {
+  /// Reserves the lists. Sets StepData::capacity.
+  void reserve_lists(const Transfer<Device>& transfer, const Capacity& capacity, StepData* data) {
     StepData& d = *data;
+    Capacity& c = d.capacity = capacity;
+    c.indices = static_cast<std::uint32_t>(
+        may_have_blocks_ ? std::max(std::size_t{capacity.indices}, usual_index_count()) : slots_);
+    reserve_solver(transfer, c.indices, data);
     const std::size_t contacts = std::size_t{c.spheres} + c.candidates;
     const std::size_t rows = contacts + d.world_joints.count;
     d.pairs = transfer.room(&pairs_, c.pairs);
@@ -88,26 +92,31 @@ class ScratchBuffers {
   }
 
  private:
-  /// Number of solver indices of a world with blocks: the places of all slots, and as many bodies
-  /// without a place, from the next block on. @param n number of slots
-  static std::size_t index_count(std::size_t n) { return 2 * n + kBodiesPerBlock; }
+  /// Number of solver indices of a world with blocks: the places of all slots, which end with a
+  /// block, and the bodies without a place of a world whose partition is not due.
+  std::size_t usual_index_count() const {
+    return slots_ + kBodiesPerBlock + slots_ / partition::kBodiesPerBodyWithoutPlace;
+  }
 
   /// Reserves the arrays by solver index. @param n number of indices
   void reserve_solver(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
     d.columns = {transfer.room(&cells_, n * CellColumns::kColumns), n};
     d.row_bodies = transfer.room(&row_bodies_, n);
-    d.surfaces = transfer.room(&surfaces_, n);
+    d.balls = transfer.room(&balls_, n);
     d.substep_bodies = {transfer.room(&substep_bodies_, n), n};
     d.first_fixed = transfer.room(&first_fixed_, n);
+    d.codes = codes_in(d.columns.cells, n);
+    if (!may_have_blocks_) return;
+    d.body_at = transfer.room(&body_at_, n);
+    transfer.room(&orientation_by_index_, n);
   }
 
   /// Reserves the arrays of worlds with several blocks. @param n number of slots
   void reserve_blocks(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
-    d.body_at = transfer.room(&body_at_, index_count(n));
     d.solver_index = transfer.room(&solver_index_, n);
-    transfer.room(&orientation_by_index_, index_count(n));
+    d.unplaced = transfer.room(&unplaced_, n);
     const std::size_t blocks = n / kBodiesPerBlock + 1;
     constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
     d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds);
@@ -138,7 +147,7 @@ class ScratchBuffers {
   Buffer<CandidateManifold> tested_;
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_, body_at_,
-      solver_index_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_;
+      solver_index_, unplaced_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_;
   Buffer<soft_step::UsedColors> used_colors_;
   Buffer<std::uint64_t> manifold_sizes_, first_order_;
   Buffer<std::uint8_t> pair_found_, marked_, constrained_, traits_;
@@ -150,9 +159,10 @@ class ScratchBuffers {
   Buffer<soft_step::PointRow> point_rows_;
   Buffer<VectorCells> cells_;
   Buffer<RowBody> row_bodies_;
-  Buffer<Surface> surfaces_;
+  Buffer<BallProperties> balls_;
   Buffer<soft_step::SubstepBody> substep_bodies_;
   Buffer<Counters> counters_;
+  std::size_t slots_ = 0;         ///< number of slots of bodies
   bool may_have_blocks_ = false;  ///< whether the world may get several blocks
 };
 

@@ -36,6 +36,8 @@ struct Capacity {
   std::uint32_t touches = 0;        ///< points of World::contacts(), except contacts of two spheres
   std::uint32_t manifold_rows = 0;  ///< including contacts of spheres without SphereRow
   std::uint32_t row_points = 0;     ///< points of these rows
+  std::uint32_t indices = 0;        ///< solver indices of a world with blocks
+  std::uint32_t unused = 0;         ///< instead of padding
 
   /// Grows capacities below `needed`, with slack. @param doubles reserves twice the need
   void grow(const Capacity& needed, bool doubles) {
@@ -53,6 +55,7 @@ struct Capacity {
     grow_one(&touches, needed.touches);
     grow_one(&manifold_rows, needed.manifold_rows);
     grow_one(&row_points, needed.row_points);
+    grow_one(&indices, needed.indices);
   }
 };
 
@@ -150,9 +153,10 @@ struct DeviceJoints {
 };
 
 /// What rows of spheres read of a body besides RowBody.
-struct alignas(4 * sizeof(Real)) Surface {
+struct alignas(4 * sizeof(Real)) BallProperties {
   Real radius = 0;  ///< [m]
   Real friction = 0, restitution = 0;
+  Real unused = 0;  ///< instead of padding
 };
 
 /// Arrays that are sorted by key, and as much memory for the sort.
@@ -187,10 +191,12 @@ struct StepData {
   std::uint64_t* manifold_sizes = nullptr;
 
   /// The movable bodies by place, with kNone in unused places, then from first_without_place() on
-  /// the bodies without a place. The solver index of a body is its index in this array, so that the
-  /// bodies of a block are neighbors in memory. In a world of one block, it is that of the body.
+  /// the bodies without a place, once PrepareProgram has put them there. The solver index of a body
+  /// is its index in this array, so that the bodies of a block are neighbors in memory. In a world
+  /// of one block, it is that of the body.
   std::uint32_t* body_at = nullptr;
   std::uint32_t* solver_index = nullptr;  ///< by body, of movable bodies in a world with blocks
+  std::uint32_t* unplaced = nullptr;      ///< the bodies without a place, in any order
 
   soft_step::UsedColors* used_colors = nullptr;  ///< by body
   /// By body: lowest color_order() of its uncolored contacts, and the lowest of those contacts.
@@ -225,7 +231,7 @@ struct StepData {
   std::uint32_t* overflow = nullptr;
   CellColumns columns;                                  ///< by solver index
   RowBody* row_bodies = nullptr;                        ///< by solver index
-  Surface* surfaces = nullptr;                          ///< by solver index
+  BallProperties* balls = nullptr;                      ///< by solver index
   StripedArray<soft_step::SubstepBody> substep_bodies;  ///< by solver index
   /// By solver index: the orientation during the step, of movable bodies. In a world of one block,
   /// it is step.orientation.
@@ -267,9 +273,7 @@ struct StepData {
     }
   }
   /// Index in `body_at` of the first body without a place, which starts a block.
-  JFPX_HD std::uint32_t first_without_place() const {
-    return (step.bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock * kBodiesPerBlock;
-  }
+  JFPX_HD std::uint32_t first_without_place() const { return placed_blocks() * kBodiesPerBlock; }
   /// Number of blocks of bodies with places, which precede the blocks of the other bodies.
   JFPX_HD std::uint32_t placed_blocks() const {
     return (counters->places + kBodiesPerBlock - 1) / kBodiesPerBlock;
@@ -301,17 +305,14 @@ struct StepData {
     return step.bodies.has_blocks ? body_at[index] : index;
   }
   /// Number of solver indices in a world with blocks, some of which may be of no body.
-  JFPX_HD std::uint32_t index_count() const { return counters->places + counters->without_place; }
-  JFPX_HD std::uint32_t solver_index_of(std::uint32_t number) const {
-    const std::uint32_t places = counters->places;
-    return number < places ? number : first_without_place() + (number - places);
+  JFPX_HD std::uint32_t index_count() const {
+    return first_without_place() + counters->without_place;
   }
   /// @param index solver index
-  JFPX_HD soft_step::RowSetup::Sphere sphere(std::uint32_t index) const {
+  JFPX_HD soft_step::RowSetup::SphereProperties sphere(std::uint32_t index) const {
     const RowBody& body = row_bodies[index];
-    const Surface& surface = surfaces[index];
-    return {body.inverse_mass, body.inverse_inertia, surface.radius, surface.friction,
-            surface.restitution};
+    const BallProperties& ball = balls[index];
+    return {body.inverse_mass, body.inverse_inertia, ball.radius, ball.friction, ball.restitution};
   }
   /// @param index solver index
   JFPX_HD BodyCells cells(std::uint32_t index) const { return {columns, index}; }

@@ -36,8 +36,7 @@ struct ContinuousCollision {
   template <class Team, class Mobile>
   JFPX_HD void run(const Team& team, std::uint32_t count, const Mobile& mobile,
                    std::uint32_t* any_fast) const {
-    /// A bit of the traits of a body that BodyTraits does not have.
-    constexpr std::uint8_t kFast = 0x80;
+    constexpr std::uint8_t kFast = soft_step::BodyTraits::kIsFast;
     const SubShapeRanges& ranges = sub_shapes.ranges;
     if (ranges.fixed_begin() == ranges.all()) return;
     team.for_each(ranges.fixed_begin(), [&](std::uint32_t i) {
