@@ -8,6 +8,7 @@ endif()
 jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   ${no_rtti}
   bullet/bullet_modules_test.cpp
+  bullet/compound_commit_test.cpp
   bullet/concave_commit_test.cpp
   bullet/contact_callbacks_test.cpp
   bullet/device_traffic_test.cpp

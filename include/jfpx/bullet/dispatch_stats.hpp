@@ -15,9 +15,10 @@ namespace bullet {
 /// Reason why an entire dispatch ran in Bullet's own code. The bits are identical either way.
 enum class Fallback : std::uint8_t {
   none,
-  small_batch,      ///< fewer pairs than minimum_batch
-  no_spheres,       ///< fewer than two spheres, fewer than 64 pairs with concave shapes, one thread
-  near_callback,    ///< the user has set a near callback
+  small_batch,    ///< fewer pairs than minimum_batch
+  no_spheres,     ///< fewer than two spheres, fewer than 64 pairs with concave shapes or compounds,
+                  ///< and one thread
+  near_callback,  ///< the user has set a near callback
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called by a callback inside another dispatch of this dispatcher
@@ -75,10 +76,11 @@ struct DispatchStats {
   std::uint64_t convex_pairs = 0;   ///< other pairs updated by Bullet's algorithms on any thread
   std::uint64_t sphere_concaves =
       0;  ///< spheres on meshes and height fields, without Bullet's algorithm
-  std::uint64_t concave_pairs = 0;  ///< other shapes on meshes and height fields, on any thread
-  std::uint64_t verified = 0;       ///< pairs recomputed because of set_verify(true)
-  std::uint64_t mismatches = 0;     ///< verified pairs that differ in any field
-  std::string first_mismatch;       ///< field and both values; empty without a mismatch
+  std::uint64_t concave_pairs = 0;   ///< other shapes on meshes and height fields, on any thread
+  std::uint64_t compound_pairs = 0;  ///< pairs with compounds, without Bullet's compound algorithms
+  std::uint64_t verified = 0;        ///< pairs recomputed because of set_verify(true)
+  std::uint64_t mismatches = 0;      ///< verified pairs that differ in any field
+  std::string first_mismatch;        ///< field and both values; empty without a mismatch
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< `none` if the last was a batch
   std::array<std::uint64_t, kOrderReasonCount>

@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/floating_point.hpp"
+#include "src/bullet/dispatch/compound_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/pair_check.hpp"
 #include "src/bullet/exact_class.hpp"
@@ -77,12 +78,15 @@ bool has_callbacks() {
          gContactAddedCallback != nullptr;
 }
 
-/// Whether pairs with concave shapes are so many that a batch without spheres gains with one
-/// thread.
-bool has_many_concave_pairs(const SphereBatch& batch) {
+/// Whether pairs with concave shapes and compounds are so many that a batch without spheres gains
+/// with one thread.
+bool gains_without_spheres(const SphereBatch& batch, std::span<const btBroadphasePair> pairs) {
   std::size_t wanted = 64;
-  for (std::size_t i = 0; i < batch.pairs().size(); ++i) {
-    if (is_concave(batch.kind(i)) && --wanted == 0) return true;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const bool gains = batch.kind(i) == PairKind::other
+                           ? is_compound_algorithm(pairs[i].m_algorithm)
+                           : is_concave(batch.kind(i));
+    if (gains && --wanted == 0) return true;
   }
   return false;
 }
@@ -132,7 +136,7 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
     // Most pairs of other shapes gain only from several threads.
-    if (spheres < 2 && pool_.threads() == 1 && !has_many_concave_pairs(batch_)) {
+    if (spheres < 2 && pool_.threads() == 1 && !gains_without_spheres(batch_, pairs_)) {
       *fallback = Fallback::no_spheres;
       return false;
     }
@@ -309,6 +313,7 @@ void BatchEngine::add(const CommitCounts& counts) {
   stats_.convex_pairs += counts.convex_pairs;
   stats_.sphere_concaves += counts.sphere_concaves;
   stats_.concave_pairs += counts.concave_pairs;
+  stats_.compound_pairs += counts.compound_pairs;
   for (std::size_t i = 1; i < kConcaveFallbackCount; ++i) {
     stats_.concave_fallbacks[i] += counts.concave_fallbacks[i];
   }

@@ -7,6 +7,7 @@
 #include "src/bullet/dispatch/convex_commit.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/compound_commit.hpp"
 #include "src/bullet/dispatch/concave_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/plane_gap.hpp"
@@ -24,33 +25,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-bool is_convex(const btCollisionObject& body, unsigned traits) {
+bool is_convex(const btCollisionShape& shape, unsigned traits) {
   if ((traits & kSphere) == 0) return (traits & kConvex) != 0;
-  return type_info_of(*body.getCollisionShape()) == &typeid(btSphereShape);
-}
-
-/// Whether the shapes of pair i are those for which its algorithm was created, because the user may
-/// have replaced a shape since.
-bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
-  const unsigned a = batch.trait_a(i), b = batch.trait_b(i);
-  switch (batch.kind(i)) {
-    case PairKind::other:
-    case PairKind::spheres:
-      return false;
-    case PairKind::boxes:
-      return (a & b & kBox) != 0;
-    case PairKind::convex:
-      return (a & b & kBox) == 0 && is_convex(*batch.body_a(i), a) &&
-             is_convex(*batch.body_b(i), b);
-    case PairKind::convex_plane:
-      return (b & kPlane) != 0 && is_convex(*batch.body_a(i), a);
-    case PairKind::plane_convex:
-      return (a & kPlane) != 0 && is_convex(*batch.body_b(i), b);
-    case PairKind::convex_concave:
-    case PairKind::concave_convex:
-      return true;  // commit_concave() reads the classes
-  }
-  return false;
+  return type_info_of(shape) == &typeid(btSphereShape);
 }
 
 /// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
@@ -118,6 +95,27 @@ bool has_sphere(const SphereBatch& batch, std::size_t i) {
   }
 }
 
+bool has_expected_shapes(PairKind kind, const btCollisionShape& shape_a, unsigned a,
+                         const btCollisionShape& shape_b, unsigned b) {
+  switch (kind) {
+    case PairKind::other:
+    case PairKind::spheres:
+      return false;
+    case PairKind::boxes:
+      return (a & b & kBox) != 0;
+    case PairKind::convex:
+      return (a & b & kBox) == 0 && is_convex(shape_a, a) && is_convex(shape_b, b);
+    case PairKind::convex_plane:
+      return (b & kPlane) != 0 && is_convex(shape_a, a);
+    case PairKind::plane_convex:
+      return (a & kPlane) != 0 && is_convex(shape_b, b);
+    case PairKind::convex_concave:
+    case PairKind::concave_convex:
+      return true;  // commit_concave() reads the classes
+  }
+  return false;
+}
+
 void commit_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
   const SphereBatch& batch = dispatch.batch;
   const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
@@ -151,6 +149,7 @@ CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
   convex_pairs += other.convex_pairs;
   sphere_concaves += other.sphere_concaves;
   concave_pairs += other.concave_pairs;
+  compound_pairs += other.compound_pairs;
   for (std::size_t i = 0; i < concave_fallbacks.size(); ++i) {
     concave_fallbacks[i] += other.concave_fallbacks[i];
   }
@@ -159,14 +158,21 @@ CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
 
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
   const SphereBatch& batch = dispatch.batch;
-  if (!has_expected_shapes(batch, i)) return false;
+  const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
+  const bool is_compound =
+      batch.kind(i) == PairKind::other && is_compound_algorithm(dispatch.pairs[i].m_algorithm);
+  if (!is_compound && !has_expected_shapes(batch.kind(i), *a.getCollisionShape(), batch.trait_a(i),
+                                           *b.getCollisionShape(), batch.trait_b(i))) {
+    return false;
+  }
   const unsigned traits = batch.either_trait(i);
   if ((traits & kActive) == 0) return true;
   // Qualified call, because no class overrides the function here.
-  if ((traits & kHasIgnoreList) != 0 && !dispatch.dispatcher.btCollisionDispatcher::needsCollision(
-                                            batch.body_a(i), batch.body_b(i))) {
+  if ((traits & kHasIgnoreList) != 0 &&
+      !dispatch.dispatcher.btCollisionDispatcher::needsCollision(&a, &b)) {
     return true;
   }
+  if (is_compound) return commit_compound(dispatch, i, counts);
   if (is_concave(batch.kind(i))) return commit_concave(dispatch, i, counts);
   if (update_sphere(batch, i, counts)) return true;
   if (!dispatch.runs_algorithms) return false;

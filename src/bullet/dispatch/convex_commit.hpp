@@ -25,6 +25,7 @@ struct CommitCounts {
   std::uint64_t convex_pairs = 0;   ///< other convex pairs, updated by Bullet's algorithms if close
   std::uint64_t sphere_concaves = 0;  ///< spheres on concave shapes, without Bullet's algorithm
   std::uint64_t concave_pairs = 0;    ///< other convex shapes on concave shapes
+  std::uint64_t compound_pairs = 0;  ///< pairs with compounds, without Bullet's compound algorithms
   std::array<std::uint64_t, kConcaveFallbackCount> concave_fallbacks{};  ///< by reason
 
   CommitCounts& operator+=(const CommitCounts& other);
@@ -49,6 +50,12 @@ struct ConvexDispatch {
 /// are computed without Bullet's algorithm.
 /// @return false if Bullet must process the pair
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
+
+/// Whether the shapes, whose traits are `a` and `b`, are those for which an algorithm of this kind
+/// was created, because the user may have replaced one since. False for PairKind::other and
+/// PairKind::spheres.
+bool has_expected_shapes(PairKind kind, const btCollisionShape& shape_a, unsigned a,
+                         const btCollisionShape& shape_b, unsigned b);
 
 /// Whether commit_in_order() may process pair i: a sphere with a box, a plane, or a concave shape.
 /// Reads the current shapes of the bodies.

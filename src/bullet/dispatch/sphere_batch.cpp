@@ -38,9 +38,12 @@ bool is_one_of(const btCollisionShape& shape) {
   return (is_exactly<Exact>(shape) || ...);
 }
 
-/// The traits of a shape that is not a sphere.
+}  // namespace
+
 unsigned traits_of(const btCollisionShape& shape) {
   switch (shape.getShapeType()) {
+    case SPHERE_SHAPE_PROXYTYPE:
+      return kSphere;
     case BOX_SHAPE_PROXYTYPE:
       return is_exactly<btBoxShape>(shape) ? kBox | kConvex : 0;
     case STATIC_PLANE_PROXYTYPE:
@@ -55,8 +58,6 @@ unsigned traits_of(const btCollisionShape& shape) {
       return 0;
   }
 }
-
-}  // namespace
 
 std::uint8_t SphereBatch::read_body(std::size_t number) {
   constexpr Real kNaN = std::numeric_limits<Real>::quiet_NaN();

@@ -28,6 +28,9 @@ enum BodyTrait : std::uint8_t {
   kConvex = 128,         ///< exactly one of Bullet's boxes, capsules, cylinders or cones
 };
 
+/// The traits of a body with this shape that follow from the shape.
+unsigned traits_of(const btCollisionShape& shape);
+
 /// The first contact of pair `pair` or of a later pair.
 inline const PairContact* first_contact(std::span<const PairContact> touching, std::size_t pair) {
   return std::lower_bound(

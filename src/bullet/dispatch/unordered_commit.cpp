@@ -3,9 +3,11 @@
 /// remaining convex pairs in small chunks, because they take a hundred times as long.
 #include "src/bullet/dispatch/unordered_commit.hpp"
 
+#include "src/bullet/dispatch/compound_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/prefetch.hpp"
 
+#include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
@@ -23,12 +25,25 @@ constexpr std::size_t kConvexAhead = 4;
 /// Minimum number of pairs for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedConvexPairs = 512;
 
-void prefetch_convex(const SphereBatch& batch, std::size_t i) {
-  if (batch.manifold(i) == nullptr) return;
-  prefetch_header(batch.manifold(i));
-  prefetch_first_point(batch.manifold(i));
-  prefetch_for_contact(*batch.body_a(i));
-  prefetch_for_contact(*batch.body_b(i));
+void prefetch_convex(const ConvexDispatch& dispatch, std::size_t i) {
+  const SphereBatch& batch = dispatch.batch;
+  if (batch.manifold(i) != nullptr) {
+    prefetch_header(batch.manifold(i));
+    prefetch_first_point(batch.manifold(i));
+    prefetch_for_contact(*batch.body_a(i));
+    prefetch_for_contact(*batch.body_b(i));
+  } else if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
+    prefetch_children(*algorithm);
+    prefetch_state(*batch.body_a(i));
+    prefetch_state(*batch.body_b(i));
+  }
+}
+/// The same, further ahead: what prefetch_convex() reads.
+void prefetch_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
+  if (dispatch.batch.manifold(i) != nullptr) return;
+  if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
+    prefetch_bytes(algorithm, sizeof(btCompoundCompoundCollisionAlgorithm));
+  }
 }
 
 /// Commits the pairs of spheres among the pairs [begin, end).
@@ -215,7 +230,9 @@ CommitCounts UnorderedCommit::commit_convex_pairs(const ConvexDispatch& dispatch
     const std::size_t begin = chunk * size, end = std::min(n, begin + size);
     Chunk part;
     for (std::size_t k = begin; k < end; ++k) {
-      if (k + kConvexAhead < end) prefetch_convex(dispatch.batch, remaining_[k + kConvexAhead]);
+      if (k + 2 * kConvexAhead < end)
+        prefetch_algorithm(dispatch, remaining_[k + 2 * kConvexAhead]);
+      if (k + kConvexAhead < end) prefetch_convex(dispatch, remaining_[k + kConvexAhead]);
       const std::uint32_t i = remaining_[k];
       if (!commit_convex(dispatch, i, &part.counts)) remaining_[begin + part.remaining++] = i;
     }
