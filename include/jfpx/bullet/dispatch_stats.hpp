@@ -87,7 +87,7 @@ struct DispatchStats {
       ordered{};  ///< batches by OrderReason; `none` counts the unordered ones
   OrderReason last_order = OrderReason::none;  ///< of the last batch
   std::array<std::uint64_t, kConcaveFallbackCount>
-      concave_fallbacks{};        ///< pairs of unordered batches by ConcaveFallback
+      concave_fallbacks{};        ///< unobserved pairs by ConcaveFallback
   std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
   std::uint64_t from_device = 0;  ///< bytes that the collider received from a device
   std::string failure;            ///< error of the last dispatch that ran out of memory

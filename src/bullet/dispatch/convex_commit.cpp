@@ -12,7 +12,9 @@
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/plane_gap.hpp"
 #include "src/bullet/exact_class.hpp"
+#include "src/bullet/prefetch.hpp"
 
+#include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -30,12 +32,18 @@ bool is_convex(const btCollisionShape& shape, unsigned traits) {
   return type_info_of(shape) == &typeid(btSphereShape);
 }
 
+/// The traits of the shapes of the two bodies of a pair.
+struct ShapeTraits {
+  unsigned a, b;
+};
+
 /// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
 /// for other shapes and for contacts that need Bullet's algorithm.
-bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts) {
-  const bool sphere_first = (batch.trait_a(i) & kSphere) != 0;
-  const unsigned other = sphere_first ? batch.trait_b(i) : batch.trait_a(i);
-  if ((batch.either_trait(i) & kSphere) == 0) return false;
+bool update_sphere(const SphereBatch& batch, std::size_t i, const ShapeTraits& traits,
+                   CommitCounts* counts) {
+  const bool sphere_first = (traits.a & kSphere) != 0;
+  const unsigned other = sphere_first ? traits.b : traits.a;
+  if (((traits.a | traits.b) & kSphere) == 0) return false;
   btPersistentManifold* manifold = batch.manifold(i);
   const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
   if ((other & kBox) != 0 && update_sphere_box(manifold, a, b, sphere_first)) {
@@ -50,11 +58,11 @@ bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts
 }
 
 /// Whether pair i is a box far from a plane, without contact points.
-bool is_clear_box(const SphereBatch& batch, std::size_t i) {
+bool is_clear_box(const SphereBatch& batch, std::size_t i, const ShapeTraits& traits) {
   const bool box_first = batch.kind(i) == PairKind::convex_plane;
   if (!box_first && batch.kind(i) != PairKind::plane_convex) return false;
   const btPersistentManifold& manifold = *batch.manifold(i);
-  if ((batch.either_trait(i) & kBox) == 0 || manifold.getNumContacts() != 0) return false;
+  if (((traits.a | traits.b) & kBox) == 0 || manifold.getNumContacts() != 0) return false;
   const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
   const btCollisionObject &box = box_first ? a : b, &plane = box_first ? b : a;
   const auto& shape = static_cast<const btBoxShape&>(*box.getCollisionShape());
@@ -69,7 +77,57 @@ void run_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
   dispatch.pairs[i].m_algorithm->processCollision(&a, &b, dispatch.info, &result);
 }
 
+bool is_compound_pair(const ConvexDispatch& dispatch, std::size_t i) {
+  return dispatch.batch.kind(i) == PairKind::other &&
+         is_compound_algorithm(dispatch.pairs[i].m_algorithm);
+}
+
+bool has_known_shapes(const ConvexDispatch& dispatch, std::size_t i, const ShapeTraits& traits) {
+  const SphereBatch& batch = dispatch.batch;
+  return is_compound_pair(dispatch, i) ||
+         has_expected_shapes(batch.kind(i), *batch.body_a(i)->getCollisionShape(), traits.a,
+                             *batch.body_b(i)->getCollisionShape(), traits.b);
+}
+
+/// Updates a pair that needs a collision and for which has_known_shapes() is true. Returns false,
+/// without a change, if Bullet must process it.
+bool update(const ConvexDispatch& dispatch, std::size_t i, const ShapeTraits& traits,
+            CommitCounts* counts) {
+  const SphereBatch& batch = dispatch.batch;
+  if (batch.kind(i) == PairKind::other) return commit_compound(dispatch, i, counts);
+  if (is_concave(batch.kind(i))) {
+    const unsigned convex = batch.kind(i) == PairKind::concave_convex ? traits.b : traits.a;
+    return commit_concave(dispatch, i, (convex & kConvex) != 0, counts);
+  }
+  if (update_sphere(batch, i, traits, counts)) return true;
+  if (!dispatch.runs_algorithms) return false;
+  if (!is_clear_box(batch, i, traits)) run_algorithm(dispatch, i);
+  ++counts->convex_pairs;
+  return true;
+}
+
 }  // namespace
+
+void prefetch_convex(const ConvexDispatch& dispatch, std::size_t i) {
+  const SphereBatch& batch = dispatch.batch;
+  if (batch.manifold(i) != nullptr) {
+    prefetch_header(batch.manifold(i));
+    prefetch_first_point(batch.manifold(i));
+    prefetch_for_contact(*batch.body_a(i));
+    prefetch_for_contact(*batch.body_b(i));
+  } else if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
+    prefetch_children(*algorithm);
+    prefetch_state(*batch.body_a(i));
+    prefetch_state(*batch.body_b(i));
+  }
+}
+
+void prefetch_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
+  if (dispatch.batch.manifold(i) != nullptr) return;
+  if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
+    prefetch_bytes(algorithm, sizeof(btCompoundCompoundCollisionAlgorithm));
+  }
+}
 
 bool has_sphere(const SphereBatch& batch, std::size_t i) {
   const btCollisionShape& a = *batch.body_a(i)->getCollisionShape();
@@ -158,27 +216,21 @@ CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
 
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
   const SphereBatch& batch = dispatch.batch;
-  const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
-  const bool is_compound =
-      batch.kind(i) == PairKind::other && is_compound_algorithm(dispatch.pairs[i].m_algorithm);
-  if (!is_compound && !has_expected_shapes(batch.kind(i), *a.getCollisionShape(), batch.trait_a(i),
-                                           *b.getCollisionShape(), batch.trait_b(i))) {
-    return false;
-  }
   const unsigned traits = batch.either_trait(i);
+  if (!has_known_shapes(dispatch, i, {batch.trait_a(i), batch.trait_b(i)})) return false;
   if ((traits & kActive) == 0) return true;
   // Qualified call, because no class overrides the function here.
-  if ((traits & kHasIgnoreList) != 0 &&
-      !dispatch.dispatcher.btCollisionDispatcher::needsCollision(&a, &b)) {
+  if ((traits & kHasIgnoreList) != 0 && !dispatch.dispatcher.btCollisionDispatcher::needsCollision(
+                                            batch.body_a(i), batch.body_b(i))) {
     return true;
   }
-  if (is_compound) return commit_compound(dispatch, i, counts);
-  if (is_concave(batch.kind(i))) return commit_concave(dispatch, i, counts);
-  if (update_sphere(batch, i, counts)) return true;
-  if (!dispatch.runs_algorithms) return false;
-  if (!is_clear_box(batch, i)) run_algorithm(dispatch, i);
-  ++counts->convex_pairs;
-  return true;
+  return update(dispatch, i, {batch.trait_a(i), batch.trait_b(i)}, counts);
+}
+
+bool commit_unobserved(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
+  const ShapeTraits traits{traits_of(*dispatch.batch.body_a(i)->getCollisionShape()),
+                           traits_of(*dispatch.batch.body_b(i)->getCollisionShape())};
+  return has_known_shapes(dispatch, i, traits) && update(dispatch, i, traits, counts);
 }
 
 }  // namespace bullet

@@ -44,12 +44,21 @@ struct ConvexDispatch {
   bool ignores_separated;
 };
 
+/// Prefetches what commit_convex() reads. prefetch_algorithm(), for a later pair, prefetches what
+/// prefetch_convex() reads.
+void prefetch_convex(const ConvexDispatch& dispatch, std::size_t i);
+void prefetch_algorithm(const ConvexDispatch& dispatch, std::size_t i);
+
 /// Updates the manifold of pair i on the calling thread, if neither other pairs nor user code can
 /// observe the update: the algorithm and both shapes must be exactly classes of Bullet whose
 /// functions only read the bodies and write the manifold of the pair. Spheres with boxes and planes
 /// are computed without Bullet's algorithm.
 /// @return false if Bullet must process the pair
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
+
+/// The same for a pair that needs a collision, on the thread that dispatches; reads the current
+/// shapes. No callback may observe the pair.
+bool commit_unobserved(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
 
 /// Whether the shapes, whose traits are `a` and `b`, are those for which an algorithm of this kind
 /// was created, because the user may have replaced one since. False for PairKind::other and

@@ -15,8 +15,9 @@ namespace bullet {
 /// One traversal of all pairs by the pair cache itself, so that the order is Bullet's for every
 /// class of cache. A touching pair of spheres is written in place, and the callbacks are called as
 /// Bullet's algorithm calls them, and so are spheres with boxes, planes and concave shapes. All
-/// other pairs, including those of other shapes, and all pairs after a callback has changed bodies
-/// or pairs, are passed to Bullet's near callback.
+/// pairs that no callback observes are updated as in any other order. Bullet's algorithms process
+/// the other pairs, and pairs of spheres that user code has changed since the test of the batch;
+/// after a change of the pair cache, they process all.
 class OrderedCommit {
  public:
   /// Called after the visit of each sphere pair. `current` is true if the manifold matches the
@@ -38,7 +39,7 @@ class OrderedCommit {
  private:
   enum class Action : std::uint8_t {
     stock,   ///< not two spheres, or a pair without Bullet's own sphere-sphere algorithm
-    skip,    ///< does not touch and has no points, so nothing can change
+    skip,    ///< does not touch and has no points, so nothing changes unless user code does
     filter,  ///< like skip, but a user-defined collision filter must be called
     commit,  ///< touches or has points
   };

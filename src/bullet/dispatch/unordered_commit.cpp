@@ -3,11 +3,9 @@
 /// remaining convex pairs in small chunks, because they take a hundred times as long.
 #include "src/bullet/dispatch/unordered_commit.hpp"
 
-#include "src/bullet/dispatch/compound_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/prefetch.hpp"
 
-#include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
@@ -24,27 +22,6 @@ constexpr std::size_t kConvexChunk = 64;
 constexpr std::size_t kConvexAhead = 4;
 /// Minimum number of pairs for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedConvexPairs = 512;
-
-void prefetch_convex(const ConvexDispatch& dispatch, std::size_t i) {
-  const SphereBatch& batch = dispatch.batch;
-  if (batch.manifold(i) != nullptr) {
-    prefetch_header(batch.manifold(i));
-    prefetch_first_point(batch.manifold(i));
-    prefetch_for_contact(*batch.body_a(i));
-    prefetch_for_contact(*batch.body_b(i));
-  } else if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
-    prefetch_children(*algorithm);
-    prefetch_state(*batch.body_a(i));
-    prefetch_state(*batch.body_b(i));
-  }
-}
-/// The same, further ahead: what prefetch_convex() reads.
-void prefetch_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
-  if (dispatch.batch.manifold(i) != nullptr) return;
-  if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
-    prefetch_bytes(algorithm, sizeof(btCompoundCompoundCollisionAlgorithm));
-  }
-}
 
 /// Commits the pairs of spheres among the pairs [begin, end).
 class Committer {
