@@ -15,10 +15,11 @@ namespace bullet {
 /// Reason why an entire dispatch ran in Bullet's own code. The bits are identical either way.
 enum class Fallback : std::uint8_t {
   none,
-  small_batch,    ///< fewer pairs than minimum_batch
-  no_spheres,     ///< fewer than two spheres, fewer than 64 pairs with concave shapes or compounds,
-                  ///< and one thread
-  near_callback,  ///< the user has set a near callback
+  small_batch,  ///< fewer pairs than minimum_batch
+  no_spheres,  ///< fewer than two spheres, fewer than 64 pairs with concave shapes and 64 compounds
+               ///< of spheres, and one thread
+  near_callback,    ///< the user has set a near callback that does not call
+                    ///< CollisionDispatcher::defaultNearCallback()
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called by a callback inside another dispatch of this dispatcher
@@ -40,8 +41,9 @@ enum class OrderReason : std::uint8_t {
   added_callback,      ///< contact added is set, and a body has CF_CUSTOM_MATERIAL_CALLBACK
   filter,              ///< the class of the dispatcher or of a body may override a filter
   pair_cache,          ///< the pair cache is not exactly a btHashedOverlappingPairCache
+  near_callback,       ///< a near callback calls CollisionDispatcher::defaultNearCallback()
 };
-inline constexpr std::size_t kOrderReasonCount = 7;
+inline constexpr std::size_t kOrderReasonCount = 8;
 
 /// A short text for a table, for example "contact callback".
 JFPX_BULLET_API std::string_view to_string(OrderReason reason) noexcept;

@@ -66,6 +66,11 @@ class JFPX_BULLET_API CollisionDispatcher : public btCollisionDispatcher {
   void dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
                                  const btDispatcherInfo& dispatch_info,
                                  btDispatcher* dispatcher) override;
+  /// As in Bullet, for near callbacks of the user. Dispatches remain batches if the near callback
+  /// calls this function instead of Bullet's; the first one after setNearCallback() runs in
+  /// Bullet's code.
+  static void defaultNearCallback(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                                  const btDispatcherInfo& info);
   /// As in Bullet; also drops the cached reference to the manifold.
   void releaseManifold(btPersistentManifold* manifold) override;
 

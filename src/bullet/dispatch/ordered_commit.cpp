@@ -8,10 +8,14 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
+
+thread_local OrderedCommit::Walk* OrderedCommit::running_ = nullptr;
+thread_local std::uint64_t OrderedCommit::default_calls_ = 0;
 
 class OrderedCommit::Walk final : public btOverlapCallback {
  public:
@@ -31,11 +35,8 @@ class OrderedCommit::Walk final : public btOverlapCallback {
         visited_(visited) {}
 
   bool processOverlap(btBroadphasePair& pair) override {
-    const std::size_t i = (reinterpret_cast<std::uintptr_t>(&pair) -
-                           reinterpret_cast<std::uintptr_t>(pairs_.data())) /
-                          sizeof(btBroadphasePair);
-    // A callback may have added, removed or moved the pair.
-    if (is_changed_ || i >= pairs_.size() || !batch_.is_entry_of(pair, i)) {
+    const std::size_t i = index_of(pair);
+    if (!has_current_entry(pair, i)) {
       visit_stock(pair);
       return false;
     }
@@ -53,6 +54,16 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     return false;
   }
   const CommitCounts& counts() const { return counts_; }
+
+  /// Processes the pair for a near callback. Returns false if Bullet must process it.
+  bool process_default(btBroadphasePair& pair, const btCollisionDispatcher& dispatcher) {
+    const std::size_t i = index_of(pair);
+    if (&dispatcher != &dispatcher_ || !has_current_entry(pair, i)) return false;
+    note_changes(i, pair);  // by the near callback
+    if (is_changed_ || (actions_[i] == Action::stock && convex_ == nullptr)) return false;
+    visit_default(i, pair);
+    return true;
+  }
 
  private:
   /// Prefetch distance: hides memory latency, and the prefetched lines stay in the cache.
@@ -104,6 +115,16 @@ class OrderedCommit::Walk final : public btOverlapCallback {
                   !batch_.is_entry_of_proxies(pair, i);
   }
 
+  std::size_t index_of(const btBroadphasePair& pair) const {
+    return (reinterpret_cast<std::uintptr_t>(&pair) -
+            reinterpret_cast<std::uintptr_t>(pairs_.data())) /
+           sizeof(btBroadphasePair);
+  }
+  /// False if a callback has added, removed or moved the pair, or has replaced its algorithm.
+  bool has_current_entry(const btBroadphasePair& pair, std::size_t i) const {
+    return !is_changed_ && i < pairs_.size() && batch_.is_entry_of(pair, i);
+  }
+
   void visit_stock(btBroadphasePair& pair) const {
     (*dispatcher_.getNearCallback())(pair, dispatcher_, info_);
   }
@@ -121,13 +142,16 @@ class OrderedCommit::Walk final : public btOverlapCallback {
 
   /// Returns false if user code may have prevented or changed the update of a pair of spheres.
   bool visit(std::size_t i, btBroadphasePair& pair) {
-    const Action action = actions_[i];
     // A callback may set a near callback during the traversal.
-    if ((action == Action::stock && convex_ == nullptr) ||
+    if ((actions_[i] == Action::stock && convex_ == nullptr) ||
         dispatcher_.getNearCallback() != &btCollisionDispatcher::defaultNearCallback) {
       visit_stock(pair);
       return false;
     }
+    return visit_default(i, pair);
+  }
+  bool visit_default(std::size_t i, btBroadphasePair& pair) {
+    const Action action = actions_[i];
     if (action == Action::skip && is_still_apart(i)) return true;
     // If a callback has replaced the bodies of a pair without an algorithm, the batch has others.
     auto& a = *static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
@@ -261,12 +285,24 @@ CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairC
   return counts;
 }
 
+void OrderedCommit::process_default(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                                    const btDispatcherInfo& info) {
+  ++default_calls_;
+  if (running_ != nullptr && running_->process_default(pair, dispatcher)) return;
+  btCollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
+}
+
 CommitCounts OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                                 const btDispatcherInfo& info, btDispatcher* argument,
                                 const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
                                 std::span<const PairContact> touching, const ConvexDispatch* convex,
                                 const Visited& visited) {
   Walk walk(*this, dispatcher, cache, info, batch, pairs, touching, convex, visited);
+  struct Restore {
+    ~Restore() { running_ = before; }
+    Walk* before;
+  };
+  const Restore restore{std::exchange(running_, &walk)};  // also if a callback throws
   cache.processAllOverlappingPairs(&walk, argument, info);
   return walk.counts();
 }

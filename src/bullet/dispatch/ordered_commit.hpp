@@ -5,6 +5,7 @@
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -36,6 +37,15 @@ class OrderedCommit {
                    std::span<const btBroadphasePair> pairs, std::span<const PairContact> touching,
                    const ConvexDispatch* convex, const Visited& visited);
 
+  /// For a near callback: processes the pair like btCollisionDispatcher::defaultNearCallback, from
+  /// the batch if run() of this dispatcher is running on the calling thread.
+  static void process_default(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                              const btDispatcherInfo& info);
+  /// The number of calls of process_default() on the calling thread.
+  static std::uint64_t default_calls() { return default_calls_; }
+  /// Before Bullet runs a dispatch on this thread: run() may have been left by longjmp().
+  static void forget_running() { running_ = nullptr; }
+
  private:
   enum class Action : std::uint8_t {
     stock,   ///< not two spheres, or a pair without Bullet's own sphere-sphere algorithm
@@ -46,6 +56,8 @@ class OrderedCommit {
   class Walk;
 
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  static thread_local Walk* running_;
+  static thread_local std::uint64_t default_calls_;
 
   std::vector<Action> actions_;
   std::vector<std::uint32_t> contacts_;  ///< by pair: the index of its contact, or kNone
