@@ -5,3 +5,4 @@ jfpx_add_bench(bullet_small_groups_bench SOURCES bullet/small_groups_bench.cpp L
 jfpx_add_bench(mixed_bench SOURCES bullet/mixed_bench.cpp LINK jfpx_bullet)
 jfpx_add_bench(bullet_from_start_bench SOURCES bullet/from_start_bench.cpp LINK jfpx_bullet)
 jfpx_add_bench(bullet_terrain_bench SOURCES bullet/terrain_bench.cpp LINK jfpx_bullet)
+jfpx_add_bench(bullet_user_scenes_bench SOURCES bullet/user_scenes_bench.cpp LINK jfpx_bullet)

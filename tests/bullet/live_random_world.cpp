@@ -99,7 +99,9 @@ btCollisionShape* LiveWorld::make_shape(const RandomBody& body) {
       auto* compound = new btCompoundShape();
       live_.keep(compound);
       btTransform at = btTransform::getIdentity();
-      for (int k = -1; k <= 1; ++k) {
+      // The trait of spheres means for a compound that it has one child.
+      const int last = (body.traits & kSharesShape) != 0 ? -1 : 1;
+      for (int k = -1; k <= last; ++k) {
         at.setOrigin(btVector3(btScalar(k) * s, 0, 0));
         compound->addChildShape(at, live_.keep(new btSphereShape(s / 2)));
       }

@@ -29,7 +29,8 @@ enum BodyTrait : unsigned {
   kAnisotropic = 1u << 8,   ///< anisotropic friction
   kLateComer = 1u << 9,     ///< not in the world at first
   kMargin = 1u << 10,       ///< an own collision margin and contact processing threshold
-  kSharesShape = 1u << 11,  ///< one shape object for all spheres of its size
+  kSharesShape = 1u << 11,  ///< one shape object for all spheres of its size; a compound of one
+                            ///< child
   kTraitCount = 12,
 };
 
@@ -136,7 +137,7 @@ struct Failure {
 };
 struct RunTotals {
   std::uint64_t steps = 0, batches = 0, written = 0, touching = 0, convex_pairs = 0, verified = 0,
-                events = 0, sphere_concaves = 0, concave_pairs = 0;
+                events = 0, sphere_concaves = 0, concave_pairs = 0, compound_pairs = 0;
 };
 
 /// Steps two worlds side by side, one of them with `ours`; compares all that first_difference()

@@ -50,6 +50,7 @@ void add_totals(const RandomWorld& world, LiveWorld& ours, RunTotals* totals) {
   totals->verified += dispatcher->stats().verified;
   totals->sphere_concaves += dispatcher->stats().sphere_concaves;
   totals->concave_pairs += dispatcher->stats().concave_pairs;
+  totals->compound_pairs += dispatcher->stats().compound_pairs;
 }
 
 }  // namespace

@@ -39,6 +39,7 @@ TEST(RandomWorlds, MatchStockWorlds) {
   EXPECT_GT(totals.verified, 0u);
   EXPECT_GT(totals.sphere_concaves, totals.steps / 20);
   EXPECT_GT(totals.concave_pairs, 0u);
+  EXPECT_GT(totals.compound_pairs, totals.steps / 100);
   RecordProperty("steps", std::to_string(totals.steps));
 }
 

@@ -31,6 +31,67 @@ TEST(ReplacedNearCallback, SeesEveryPairAndDecides) {
   EXPECT_EQ(twins.stats().batches, 0u);
 }
 
+void near_callback_with_our_default(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                                    const btDispatcherInfo& info) {
+  const auto* a = static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
+  const auto* b = static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+  log_event("near " + name_of(a) + " " + name_of(b));
+  if ((a->getUserIndex() + b->getUserIndex()) % 7 == 0) return;
+  CollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
+  if ((a->getUserIndex() + b->getUserIndex()) % 9 == 0) {  // twice
+    CollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
+  }
+}
+
+TEST(ReplacedNearCallback, ThatCallsOurDefaultRunsInBatches) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 60, 11);
+    w.dispatcher->setNearCallback(near_callback_with_our_default);
+  });
+  ASSERT_TRUE(twins.step(30));
+  // All but the first, or all, because the other world has called the function before.
+  EXPECT_GE(twins.stats().batches, 29u);
+  EXPECT_EQ(twins.stats().ordered[static_cast<std::size_t>(OrderReason::near_callback)],
+            twins.stats().batches);
+  EXPECT_GT(twins.stats().written, 1000u);
+  EXPECT_GT(twins.stats().sphere_boxes, 0u);
+  // A near callback that does not is left to Bullet from the second dispatch on.
+  const std::uint64_t batches = twins.stats().batches;
+  twins.both([](BulletWorld& w) { w.dispatcher->setNearCallback(logging_near_callback); });
+  ASSERT_TRUE(twins.step(5));
+  EXPECT_EQ(twins.stats().batches, batches + 1);
+}
+
+/// Leaves a dispatch by an exception, so that the batch ends early.
+void throwing_near_callback(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                            const btDispatcherInfo& info) {
+  log_event("near");
+  if (g_current->log.size() % 40 == 39) throw 1;
+  CollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
+}
+
+TEST(ReplacedNearCallback, MayThrowOutOfABatch) {
+  Twins twins;
+  twins.both([](BulletWorld& w) {
+    add_heap(w, 60, 14);
+    w.dispatcher->setNearCallback(throwing_near_callback);
+    for (int step = 0; step < 10; ++step) {
+      try {
+        w.dispatcher->dispatchAllCollisionPairs(w.world.getPairCache(), w.world.getDispatchInfo(),
+                                                w.dispatcher.get());
+      } catch (int) {
+        log_event("thrown");
+      }
+    }
+  });
+  EXPECT_TRUE(twins.compare());
+  twins.both([](BulletWorld& w) {
+    w.dispatcher->setNearCallback(btCollisionDispatcher::defaultNearCallback);
+  });
+  ASSERT_TRUE(twins.step(5));
+}
+
 TEST(ReplacedNearCallback, ComesAndGoesMidRun) {
   Twins twins;
   twins.both([](BulletWorld& w) { add_heap(w, 60, 12); });

@@ -8,6 +8,7 @@ endif()
 jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   ${no_rtti}
   bullet/bullet_modules_test.cpp
+  bullet/compound_commit_test.cpp
   bullet/concave_commit_test.cpp
   bullet/contact_callbacks_test.cpp
   bullet/device_traffic_test.cpp
@@ -22,6 +23,7 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/sphere_plane_test.cpp
   bullet/stats_test.cpp
   bullet/unordered_commit_test.cpp
+  bullet/user_code_test.cpp
   LINK jfpx_bullet jfpx_scenes)
 # Has private names of other tests.
 set_source_files_properties(bullet/sphere_box_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

@@ -15,9 +15,11 @@ namespace bullet {
 /// Reason why an entire dispatch ran in Bullet's own code. The bits are identical either way.
 enum class Fallback : std::uint8_t {
   none,
-  small_batch,      ///< fewer pairs than minimum_batch
-  no_spheres,       ///< fewer than two spheres, fewer than 64 pairs with concave shapes, one thread
-  near_callback,    ///< the user has set a near callback
+  small_batch,  ///< fewer pairs than minimum_batch
+  no_spheres,  ///< fewer than two spheres, fewer than 64 pairs with concave shapes and 64 compounds
+               ///< of spheres, and one thread
+  near_callback,    ///< the user has set a near callback that does not call
+                    ///< CollisionDispatcher::defaultNearCallback()
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called by a callback inside another dispatch of this dispatcher
@@ -39,8 +41,9 @@ enum class OrderReason : std::uint8_t {
   added_callback,      ///< contact added is set, and a body has CF_CUSTOM_MATERIAL_CALLBACK
   filter,              ///< the class of the dispatcher or of a body may override a filter
   pair_cache,          ///< the pair cache is not exactly a btHashedOverlappingPairCache
+  near_callback,       ///< a near callback calls CollisionDispatcher::defaultNearCallback()
 };
-inline constexpr std::size_t kOrderReasonCount = 7;
+inline constexpr std::size_t kOrderReasonCount = 8;
 
 /// A short text for a table, for example "contact callback".
 JFPX_BULLET_API std::string_view to_string(OrderReason reason) noexcept;
@@ -75,17 +78,18 @@ struct DispatchStats {
   std::uint64_t convex_pairs = 0;   ///< other pairs updated by Bullet's algorithms on any thread
   std::uint64_t sphere_concaves =
       0;  ///< spheres on meshes and height fields, without Bullet's algorithm
-  std::uint64_t concave_pairs = 0;  ///< other shapes on meshes and height fields, on any thread
-  std::uint64_t verified = 0;       ///< pairs recomputed because of set_verify(true)
-  std::uint64_t mismatches = 0;     ///< verified pairs that differ in any field
-  std::string first_mismatch;       ///< field and both values; empty without a mismatch
+  std::uint64_t concave_pairs = 0;   ///< other shapes on meshes and height fields, on any thread
+  std::uint64_t compound_pairs = 0;  ///< pairs with compounds, without Bullet's compound algorithms
+  std::uint64_t verified = 0;        ///< pairs recomputed because of set_verify(true)
+  std::uint64_t mismatches = 0;      ///< verified pairs that differ in any field
+  std::string first_mismatch;        ///< field and both values; empty without a mismatch
   std::array<std::uint64_t, kFallbackCount> fallbacks{};  ///< dispatches by Fallback
   Fallback last_fallback = Fallback::none;                ///< `none` if the last was a batch
   std::array<std::uint64_t, kOrderReasonCount>
       ordered{};  ///< batches by OrderReason; `none` counts the unordered ones
   OrderReason last_order = OrderReason::none;  ///< of the last batch
   std::array<std::uint64_t, kConcaveFallbackCount>
-      concave_fallbacks{};        ///< pairs of unordered batches by ConcaveFallback
+      concave_fallbacks{};        ///< unobserved pairs by ConcaveFallback
   std::uint64_t to_device = 0;    ///< bytes that the collider sent to a device
   std::uint64_t from_device = 0;  ///< bytes that the collider received from a device
   std::string failure;            ///< error of the last dispatch that ran out of memory

@@ -26,18 +26,16 @@ struct DispatcherOptions {
 };
 
 /// A btCollisionDispatcher that computes the pairs of a dispatch in one batch. It tests all pairs
-/// of two spheres on the CPU or a GPU. Unless a callback or an overridden filter can observe the
-/// order of the pairs, it also computes pairs of a sphere with a btBoxShape or btStaticPlaneShape,
-/// and runs Bullet's algorithms for the other pairs of boxes, capsules, cylinders, cones, spheres
-/// and planes on all threads. Bullet computes the pairs of all other shapes.
+/// of two spheres on the CPU or a GPU. It also computes pairs of a sphere with a btBoxShape, a
+/// btStaticPlaneShape or a terrain, and of spheres in compounds, and runs Bullet's algorithms for
+/// the other pairs of boxes, capsules, cylinders, cones, spheres and planes: on all threads, unless
+/// a callback or an overridden filter can observe the order of the pairs. Bullet computes the pairs
+/// of all other shapes.
 ///
 /// Manifolds, their order, every field of every point, callbacks, and therefore trajectories are
 /// those of btCollisionDispatcher, bit for bit. No create function is registered: the pairs keep
-/// Bullet's own algorithms.
-///
-/// Unlike in Bullet, a callback that moves bodies, changes radii, writes into the manifolds of
-/// other pairs or changes the pair cache while a dispatch is running takes effect only in the next
-/// dispatch.
+/// Bullet's own algorithms. Callbacks and filters may change bodies, manifolds and the pair cache
+/// during a dispatch, as far as Bullet allows it.
 ///
 /// Programs that include Bullet's headers need -ffp-contract=off, which linking jfpx::bullet adds;
 /// stats().warning reports a program that is compiled otherwise. As in Bullet, only one thread at a
@@ -68,6 +66,11 @@ class JFPX_BULLET_API CollisionDispatcher : public btCollisionDispatcher {
   void dispatchAllCollisionPairs(btOverlappingPairCache* pair_cache,
                                  const btDispatcherInfo& dispatch_info,
                                  btDispatcher* dispatcher) override;
+  /// As in Bullet, for near callbacks of the user. Dispatches remain batches if the near callback
+  /// calls this function instead of Bullet's; the first one after setNearCallback() runs in
+  /// Bullet's code.
+  static void defaultNearCallback(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                                  const btDispatcherInfo& info);
   /// As in Bullet; also drops the cached reference to the manifold.
   void releaseManifold(btPersistentManifold* manifold) override;
 

@@ -64,6 +64,10 @@ bool has_stock_sphere_function(const btCollisionDispatcher& dispatcher) {
   return function != nullptr && is_exactly<btSphereSphereCollisionAlgorithm::CreateFunc>(*function);
 }
 
+bool has_stock_near_callback(const btCollisionDispatcher& dispatcher) {
+  return dispatcher.getNearCallback() == btNearCallback(btCollisionDispatcher::defaultNearCallback);
+}
+
 const btCollisionObject& object_of(const btBroadphaseProxy* proxy) {
   return *static_cast<const btCollisionObject*>(proxy->m_clientObject);
 }
@@ -77,10 +81,11 @@ bool has_callbacks() {
          gContactAddedCallback != nullptr;
 }
 
-/// Whether pairs with concave shapes are so many that a batch without spheres gains with one
-/// thread.
-bool has_many_concave_pairs(const SphereBatch& batch) {
+/// Whether pairs with concave shapes, or spheres in compounds, are so many that a batch without
+/// other spheres gains with one thread.
+bool gains_without_spheres(const SphereBatch& batch) {
   std::size_t wanted = 64;
+  if (batch.wrapped_spheres() >= wanted) return true;
   for (std::size_t i = 0; i < batch.pairs().size(); ++i) {
     if (is_concave(batch.kind(i)) && --wanted == 0) return true;
   }
@@ -108,7 +113,7 @@ Fallback BatchEngine::reason_to_fall_back(const btCollisionDispatcher& dispatche
   if (running_) return Fallback::nested;
   if (pairs == 0 || pairs < minimum_batch_) return Fallback::small_batch;
   if (!rounds_to_nearest()) return Fallback::rounding;
-  if (dispatcher.getNearCallback() != btNearCallback(btCollisionDispatcher::defaultNearCallback)) {
+  if (!has_stock_near_callback(dispatcher) && !near_calls_default_) {
     return Fallback::near_callback;
   }
   if (!has_stock_sphere_function(dispatcher)) return Fallback::create_function;
@@ -123,7 +128,7 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
                           btOverlappingPairCache& cache, Fallback* fallback) {
   const TrapsMasked masked;
   try {
-    few_are_active_ = !traits.may_override_filter &&
+    few_are_active_ = !traits.may_override_filter && has_stock_near_callback(dispatcher) &&
                       is_exactly<btHashedOverlappingPairCache>(cache) && find_few_active();
     if (few_are_active_) {
       order_reason_ = OrderReason::none;
@@ -132,11 +137,14 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
     // Most pairs of other shapes gain only from several threads.
-    if (spheres < 2 && pool_.threads() == 1 && !has_many_concave_pairs(batch_)) {
+    if (spheres < 2 && pool_.threads() == 1 && !gains_without_spheres(batch_)) {
       *fallback = Fallback::no_spheres;
       return false;
     }
     order_reason_ = reason_for_order(batch_, traits.may_override_filter);
+    if (order_reason_ == OrderReason::none && !has_stock_near_callback(dispatcher)) {
+      order_reason_ = OrderReason::near_callback;
+    }
     // A user-defined pair cache may observe the traversal itself.
     if (order_reason_ == OrderReason::none && !is_exactly<btHashedOverlappingPairCache>(cache)) {
       order_reason_ = OrderReason::pair_cache;
@@ -197,6 +205,8 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTr
                            btDispatcher* argument) {
   ++stats_.dispatches;
   const std::span<const btBroadphasePair> pairs = pairs_of(cache);
+  const std::uint64_t default_calls = OrderedCommit::default_calls();
+  near_calls_default_ = default_calls != std::exchange(default_calls_, default_calls);
   Fallback fallback = reason_to_fall_back(dispatcher, pairs.size(), info);
   const auto start = fallback == Fallback::none ? Clock::now() : Clock::time_point{};
   if (fallback == Fallback::none) {
@@ -206,6 +216,7 @@ bool BatchEngine::dispatch(btCollisionDispatcher& dispatcher, const DispatcherTr
   stats_.last_fallback = fallback;
   if (fallback != Fallback::none) {
     ++stats_.fallbacks[static_cast<std::size_t>(fallback)];
+    OrderedCommit::forget_running();
     return false;
   }
   ++stats_.batches;
@@ -309,6 +320,7 @@ void BatchEngine::add(const CommitCounts& counts) {
   stats_.convex_pairs += counts.convex_pairs;
   stats_.sphere_concaves += counts.sphere_concaves;
   stats_.concave_pairs += counts.concave_pairs;
+  stats_.compound_pairs += counts.compound_pairs;
   for (std::size_t i = 1; i < kConcaveFallbackCount; ++i) {
     stats_.concave_fallbacks[i] += counts.concave_fallbacks[i];
   }

@@ -89,6 +89,11 @@ class JFPX_BULLET_API BatchEngine {
   std::span<const btBroadphasePair> pairs_;
   std::span<const PairContact> touching_;
   OrderReason order_reason_ = OrderReason::none;
+  /// Whether the near callback has called CollisionDispatcher::defaultNearCallback() since the
+  /// begin of the last dispatch, so that a batch gains.
+  bool near_calls_default_ = false;
+  std::uint64_t default_calls_ =
+      OrderedCommit::default_calls();  ///< OrderedCommit::default_calls() at that time
   bool few_are_active_ = false;        ///< Bullet processes the pairs in active_, and no others
   std::vector<std::uint32_t> active_;  ///< numbers of pairs
 };

@@ -457,12 +457,9 @@ bool commit_concave_in_order(const ConvexDispatch& dispatch, std::size_t i, Comm
   return fallback == ConcaveFallback::none;
 }
 
-bool commit_concave(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
-  const SphereBatch& batch = dispatch.batch;
-  const unsigned convex_traits =
-      batch.kind(i) == PairKind::concave_convex ? batch.trait_b(i) : batch.trait_a(i);
-  const ConcaveFallback fallback =
-      ConcavePair(dispatch, i).update((convex_traits & kConvex) != 0, counts);
+bool commit_concave(const ConvexDispatch& dispatch, std::size_t i, bool is_convex,
+                    CommitCounts* counts) {
+  const ConcaveFallback fallback = ConcavePair(dispatch, i).update(is_convex, counts);
   ++counts->concave_fallbacks[static_cast<std::size_t>(fallback)];
   return fallback == ConcaveFallback::none;
 }

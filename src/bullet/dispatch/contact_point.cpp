@@ -41,6 +41,24 @@ void combine_materials(const PackedBody& a, const PackedBody& b, btManifoldPoint
       clamp_friction(a.spinning_friction * b.friction + b.spinning_friction * a.friction);
 }
 
+void write_point(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
+                 const PackedBody& b, const btVector3& centre_b, Real radius_b) {
+  if (contact.distance > manifold->getContactBreakingThreshold()) return;
+  const btVector3 normal(contact.normal.x, contact.normal.y, contact.normal.z);
+  const btVector3 on_b = centre_b + radius_b * normal;
+  const btVector3 on_a = on_b + normal * contact.distance;
+
+  // btPersistentManifold::addManifoldPoint for an empty manifold. The point is constructed in
+  // place, because a copy directly after the writes would stall on store forwarding.
+  manifold->setNumContacts(1);
+  auto* point = new (&manifold->getContactPoint(0))
+      btManifoldPoint(a.pose.invXform(on_a), b.pose.invXform(on_b), normal, contact.distance);
+  point->m_positionWorldOnA = on_a;
+  point->m_positionWorldOnB = on_b;
+  combine_materials(a, b, point);
+  btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
+}
+
 }  // namespace
 
 bool contacts_are_observed() {
@@ -70,20 +88,13 @@ int special_collision_flags() {
 
 void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
                    const PackedBody& b, Real radius_b) {
-  if (contact.distance > manifold->getContactBreakingThreshold()) return;
-  const btVector3 normal(contact.normal.x, contact.normal.y, contact.normal.z);
-  const btVector3 on_b = b.pose.getOrigin() + radius_b * normal;
-  const btVector3 on_a = on_b + normal * contact.distance;
+  write_point(manifold, contact, a, b, b.pose.getOrigin(), radius_b);
+}
 
-  // btPersistentManifold::addManifoldPoint for an empty manifold. The point is constructed in
-  // place, because a copy directly after the writes would stall on store forwarding.
-  manifold->setNumContacts(1);
-  auto* point = new (&manifold->getContactPoint(0))
-      btManifoldPoint(a.pose.invXform(on_a), b.pose.invXform(on_b), normal, contact.distance);
-  point->m_positionWorldOnA = on_a;
-  point->m_positionWorldOnB = on_b;
-  combine_materials(a, b, point);
-  btPlaneSpace1(normal, point->m_lateralFrictionDir1, point->m_lateralFrictionDir2);
+void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
+                   const PackedBody& b, const SphereInstance& sphere_b) {
+  const Vec3& centre = sphere_b.centre;
+  write_point(manifold, contact, a, b, btVector3(centre.x, centre.y, centre.z), sphere_b.radius);
 }
 
 bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject& body_a,

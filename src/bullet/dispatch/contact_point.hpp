@@ -3,6 +3,7 @@
 
 #include <jfpx/contact.hpp>
 #include <jfpx/math.hpp>
+#include <jfpx/sphere_collider.hpp>
 
 #include "src/bullet/dispatch/packed_body.hpp"
 
@@ -34,6 +35,9 @@ inline bool has_finite_values(const PairContact& contact) {
 /// Bullet's bits in every field. `radius_b` is the radius of body b's sphere.
 void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
                    const PackedBody& b, Real radius_b);
+/// The same for a sphere of body b that has another centre than the body.
+void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
+                   const PackedBody& b, const SphereInstance& sphere_b);
 
 /// Updates the manifold of a sphere and a box, in either order, like btConvexConvexAlgorithm
 /// without perturbation. The shapes must be exactly btSphereShape and btBoxShape.

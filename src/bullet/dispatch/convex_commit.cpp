@@ -7,11 +7,14 @@
 #include "src/bullet/dispatch/convex_commit.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/compound_commit.hpp"
 #include "src/bullet/dispatch/concave_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/plane_gap.hpp"
 #include "src/bullet/exact_class.hpp"
+#include "src/bullet/prefetch.hpp"
 
+#include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -24,41 +27,23 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-bool is_convex(const btCollisionObject& body, unsigned traits) {
+bool is_convex(const btCollisionShape& shape, unsigned traits) {
   if ((traits & kSphere) == 0) return (traits & kConvex) != 0;
-  return type_info_of(*body.getCollisionShape()) == &typeid(btSphereShape);
+  return type_info_of(shape) == &typeid(btSphereShape);
 }
 
-/// Whether the shapes of pair i are those for which its algorithm was created, because the user may
-/// have replaced a shape since.
-bool has_expected_shapes(const SphereBatch& batch, std::size_t i) {
-  const unsigned a = batch.trait_a(i), b = batch.trait_b(i);
-  switch (batch.kind(i)) {
-    case PairKind::other:
-    case PairKind::spheres:
-      return false;
-    case PairKind::boxes:
-      return (a & b & kBox) != 0;
-    case PairKind::convex:
-      return (a & b & kBox) == 0 && is_convex(*batch.body_a(i), a) &&
-             is_convex(*batch.body_b(i), b);
-    case PairKind::convex_plane:
-      return (b & kPlane) != 0 && is_convex(*batch.body_a(i), a);
-    case PairKind::plane_convex:
-      return (a & kPlane) != 0 && is_convex(*batch.body_b(i), b);
-    case PairKind::convex_concave:
-    case PairKind::concave_convex:
-      return true;  // commit_concave() reads the classes
-  }
-  return false;
-}
+/// The traits of the shapes of the two bodies of a pair.
+struct ShapeTraits {
+  unsigned a, b;
+};
 
 /// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
 /// for other shapes and for contacts that need Bullet's algorithm.
-bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts) {
-  const bool sphere_first = (batch.trait_a(i) & kSphere) != 0;
-  const unsigned other = sphere_first ? batch.trait_b(i) : batch.trait_a(i);
-  if ((batch.either_trait(i) & kSphere) == 0) return false;
+bool update_sphere(const SphereBatch& batch, std::size_t i, const ShapeTraits& traits,
+                   CommitCounts* counts) {
+  const bool sphere_first = (traits.a & kSphere) != 0;
+  const unsigned other = sphere_first ? traits.b : traits.a;
+  if (((traits.a | traits.b) & kSphere) == 0) return false;
   btPersistentManifold* manifold = batch.manifold(i);
   const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
   if ((other & kBox) != 0 && update_sphere_box(manifold, a, b, sphere_first)) {
@@ -73,11 +58,11 @@ bool update_sphere(const SphereBatch& batch, std::size_t i, CommitCounts* counts
 }
 
 /// Whether pair i is a box far from a plane, without contact points.
-bool is_clear_box(const SphereBatch& batch, std::size_t i) {
+bool is_clear_box(const SphereBatch& batch, std::size_t i, const ShapeTraits& traits) {
   const bool box_first = batch.kind(i) == PairKind::convex_plane;
   if (!box_first && batch.kind(i) != PairKind::plane_convex) return false;
   const btPersistentManifold& manifold = *batch.manifold(i);
-  if ((batch.either_trait(i) & kBox) == 0 || manifold.getNumContacts() != 0) return false;
+  if (((traits.a | traits.b) & kBox) == 0 || manifold.getNumContacts() != 0) return false;
   const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
   const btCollisionObject &box = box_first ? a : b, &plane = box_first ? b : a;
   const auto& shape = static_cast<const btBoxShape&>(*box.getCollisionShape());
@@ -92,7 +77,57 @@ void run_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
   dispatch.pairs[i].m_algorithm->processCollision(&a, &b, dispatch.info, &result);
 }
 
+bool is_compound_pair(const ConvexDispatch& dispatch, std::size_t i) {
+  return dispatch.batch.kind(i) == PairKind::other &&
+         is_compound_algorithm(dispatch.pairs[i].m_algorithm);
+}
+
+bool has_known_shapes(const ConvexDispatch& dispatch, std::size_t i, const ShapeTraits& traits) {
+  const SphereBatch& batch = dispatch.batch;
+  return is_compound_pair(dispatch, i) ||
+         has_expected_shapes(batch.kind(i), *batch.body_a(i)->getCollisionShape(), traits.a,
+                             *batch.body_b(i)->getCollisionShape(), traits.b);
+}
+
+/// Updates a pair that needs a collision and for which has_known_shapes() is true. Returns false,
+/// without a change, if Bullet must process it.
+bool update(const ConvexDispatch& dispatch, std::size_t i, const ShapeTraits& traits,
+            CommitCounts* counts) {
+  const SphereBatch& batch = dispatch.batch;
+  if (batch.kind(i) == PairKind::other) return commit_compound(dispatch, i, counts);
+  if (is_concave(batch.kind(i))) {
+    const unsigned convex = batch.kind(i) == PairKind::concave_convex ? traits.b : traits.a;
+    return commit_concave(dispatch, i, (convex & kConvex) != 0, counts);
+  }
+  if (update_sphere(batch, i, traits, counts)) return true;
+  if (!dispatch.runs_algorithms) return false;
+  if (!is_clear_box(batch, i, traits)) run_algorithm(dispatch, i);
+  ++counts->convex_pairs;
+  return true;
+}
+
 }  // namespace
+
+void prefetch_convex(const ConvexDispatch& dispatch, std::size_t i) {
+  const SphereBatch& batch = dispatch.batch;
+  if (batch.manifold(i) != nullptr) {
+    prefetch_header(batch.manifold(i));
+    prefetch_first_point(batch.manifold(i));
+    prefetch_for_contact(*batch.body_a(i));
+    prefetch_for_contact(*batch.body_b(i));
+  } else if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
+    prefetch_children(*algorithm);
+    prefetch_state(*batch.body_a(i));
+    prefetch_state(*batch.body_b(i));
+  }
+}
+
+void prefetch_algorithm(const ConvexDispatch& dispatch, std::size_t i) {
+  if (dispatch.batch.manifold(i) != nullptr) return;
+  if (const btCollisionAlgorithm* algorithm = dispatch.pairs[i].m_algorithm) {
+    prefetch_bytes(algorithm, sizeof(btCompoundCompoundCollisionAlgorithm));
+  }
+}
 
 bool has_sphere(const SphereBatch& batch, std::size_t i) {
   const btCollisionShape& a = *batch.body_a(i)->getCollisionShape();
@@ -116,6 +151,27 @@ bool has_sphere(const SphereBatch& batch, std::size_t i) {
     default:
       return false;
   }
+}
+
+bool has_expected_shapes(PairKind kind, const btCollisionShape& shape_a, unsigned a,
+                         const btCollisionShape& shape_b, unsigned b) {
+  switch (kind) {
+    case PairKind::other:
+    case PairKind::spheres:
+      return false;
+    case PairKind::boxes:
+      return (a & b & kBox) != 0;
+    case PairKind::convex:
+      return (a & b & kBox) == 0 && is_convex(shape_a, a) && is_convex(shape_b, b);
+    case PairKind::convex_plane:
+      return (b & kPlane) != 0 && is_convex(shape_a, a);
+    case PairKind::plane_convex:
+      return (a & kPlane) != 0 && is_convex(shape_b, b);
+    case PairKind::convex_concave:
+    case PairKind::concave_convex:
+      return true;  // commit_concave() reads the classes
+  }
+  return false;
 }
 
 void commit_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
@@ -151,6 +207,7 @@ CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
   convex_pairs += other.convex_pairs;
   sphere_concaves += other.sphere_concaves;
   concave_pairs += other.concave_pairs;
+  compound_pairs += other.compound_pairs;
   for (std::size_t i = 0; i < concave_fallbacks.size(); ++i) {
     concave_fallbacks[i] += other.concave_fallbacks[i];
   }
@@ -159,20 +216,21 @@ CommitCounts& CommitCounts::operator+=(const CommitCounts& other) {
 
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
   const SphereBatch& batch = dispatch.batch;
-  if (!has_expected_shapes(batch, i)) return false;
   const unsigned traits = batch.either_trait(i);
+  if (!has_known_shapes(dispatch, i, {batch.trait_a(i), batch.trait_b(i)})) return false;
   if ((traits & kActive) == 0) return true;
   // Qualified call, because no class overrides the function here.
   if ((traits & kHasIgnoreList) != 0 && !dispatch.dispatcher.btCollisionDispatcher::needsCollision(
                                             batch.body_a(i), batch.body_b(i))) {
     return true;
   }
-  if (is_concave(batch.kind(i))) return commit_concave(dispatch, i, counts);
-  if (update_sphere(batch, i, counts)) return true;
-  if (!dispatch.runs_algorithms) return false;
-  if (!is_clear_box(batch, i)) run_algorithm(dispatch, i);
-  ++counts->convex_pairs;
-  return true;
+  return update(dispatch, i, {batch.trait_a(i), batch.trait_b(i)}, counts);
+}
+
+bool commit_unobserved(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts) {
+  const ShapeTraits traits{traits_of(*dispatch.batch.body_a(i)->getCollisionShape()),
+                           traits_of(*dispatch.batch.body_b(i)->getCollisionShape())};
+  return has_known_shapes(dispatch, i, traits) && update(dispatch, i, traits, counts);
 }
 
 }  // namespace bullet

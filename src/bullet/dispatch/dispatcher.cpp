@@ -40,6 +40,12 @@ void CollisionDispatcher::releaseManifold(btPersistentManifold* manifold) {
   btCollisionDispatcher::releaseManifold(manifold);
 }
 
+void CollisionDispatcher::defaultNearCallback(btBroadphasePair& pair,
+                                              btCollisionDispatcher& dispatcher,
+                                              const btDispatcherInfo& info) {
+  OrderedCommit::process_default(pair, dispatcher, info);
+}
+
 std::size_t CollisionDispatcher::minimum_batch() const noexcept {
   return impl_->engine.minimum_batch();
 }
@@ -93,6 +99,8 @@ std::string_view to_string(OrderReason reason) noexcept {
       return "filter overridden";
     case OrderReason::pair_cache:
       return "pair cache of another class";
+    case OrderReason::near_callback:
+      return "near callback";
   }
   return "unknown";
 }

@@ -8,10 +8,14 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
+
+thread_local OrderedCommit::Walk* OrderedCommit::running_ = nullptr;
+thread_local std::uint64_t OrderedCommit::default_calls_ = 0;
 
 class OrderedCommit::Walk final : public btOverlapCallback {
  public:
@@ -31,35 +35,59 @@ class OrderedCommit::Walk final : public btOverlapCallback {
         visited_(visited) {}
 
   bool processOverlap(btBroadphasePair& pair) override {
-    const std::size_t i = (reinterpret_cast<std::uintptr_t>(&pair) -
-                           reinterpret_cast<std::uintptr_t>(pairs_.data())) /
-                          sizeof(btBroadphasePair);
-    // A callback may have added, removed or moved the pair.
-    if (is_changed_ || i >= pairs_.size() || !batch_.is_entry_of(pair, i)) {
+    const std::size_t i = index_of(pair);
+    if (!has_current_entry(pair, i)) {
       visit_stock(pair);
       return false;
     }
-    prefetch_commit(i + kAhead);
+    prefetch_visit(i + kAhead);
+    if (i + kConvexAhead < pairs_.size() && actions_[i + kConvexAhead] == Action::stock) {
+      if (convex_ != nullptr) prefetch_convex(*convex_, i + kConvexAhead);
+    }
     const bool current = visit(i, pair);
-    if (actions_[i] == Action::stock || actions_[i] == Action::commit) note_changes(i, pair);
+    note_changes(i, pair);
     if (is_changed_) return false;
-    if (visited_ && batch_.kind(i) == PairKind::spheres && batch_.both_are_spheres(i)) {
+    if (visited_ && batch_.kind(i) == PairKind::spheres && batch_.both_are_spheres(i) &&
+        batch_.has_current_spheres(i)) {
       visited_(i, current);
     }
     return false;
   }
   const CommitCounts& counts() const { return counts_; }
 
+  /// Processes the pair for a near callback. Returns false if Bullet must process it.
+  bool process_default(btBroadphasePair& pair, const btCollisionDispatcher& dispatcher) {
+    const std::size_t i = index_of(pair);
+    if (&dispatcher != &dispatcher_ || !has_current_entry(pair, i)) return false;
+    note_changes(i, pair);  // by the near callback
+    if (is_changed_ || (actions_[i] == Action::stock && convex_ == nullptr)) return false;
+    visit_default(i, pair);
+    return true;
+  }
+
  private:
   /// Prefetch distance: hides memory latency, and the prefetched lines stay in the cache.
   static constexpr std::size_t kAhead = 12;
+  static constexpr std::size_t kConvexAhead = 5;
 
-  void prefetch_commit(std::size_t i) const {
-    if (i >= pairs_.size() || actions_[i] != Action::commit) return;
-    prefetch_header(batch_.manifold(i));
-    prefetch_first_point(batch_.manifold(i));
-    prefetch_for_contact(*batch_.body_a(i));
-    prefetch_for_contact(*batch_.body_b(i));
+  void prefetch_visit(std::size_t i) const {
+    if (i >= pairs_.size()) return;
+    switch (actions_[i]) {
+      case Action::stock:
+        if (convex_ != nullptr) prefetch_algorithm(*convex_, i);
+        return;
+      case Action::skip:
+      case Action::filter:
+        prefetch_count(batch_.manifold(i));
+        prefetch_geometry(*batch_.body_a(i));
+        prefetch_geometry(*batch_.body_b(i));
+        return;
+      case Action::commit:
+        prefetch_header(batch_.manifold(i));
+        prefetch_first_point(batch_.manifold(i));
+        prefetch_for_contact(*batch_.body_a(i));
+        prefetch_for_contact(*batch_.body_b(i));
+    }
   }
 
   static bool is_plain(const btPersistentManifold& manifold, const btCollisionObject& a,
@@ -75,58 +103,111 @@ class OrderedCommit::Walk final : public btOverlapCallback {
            (flags & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) != 0;
   }
 
-  /// Notes whether a callback for the pair has changed its bodies or the pair cache, so that the
-  /// contacts of later pairs may differ. Removed bodies, which may not exist, are not read.
+  static bool is_observed(const btCollisionObject& a, const btCollisionObject& b) {
+    return contacts_are_observed() || gContactProcessedCallback != nullptr || calls_added(a, b);
+  }
+
+  /// Notes whether user code has changed the pair cache. Bodies, which may have been removed, are
+  /// not read.
   void note_changes(std::size_t i, const btBroadphasePair& pair) {
     // Bullet may have created the algorithm of the pair.
     is_changed_ = static_cast<std::size_t>(cache_.getNumOverlappingPairs()) != pairs_.size() ||
-                  !batch_.is_entry_of_proxies(pair, i) || !batch_.has_current_spheres(i);
+                  !batch_.is_entry_of_proxies(pair, i);
+  }
+
+  std::size_t index_of(const btBroadphasePair& pair) const {
+    return (reinterpret_cast<std::uintptr_t>(&pair) -
+            reinterpret_cast<std::uintptr_t>(pairs_.data())) /
+           sizeof(btBroadphasePair);
+  }
+  /// False if a callback has added, removed or moved the pair, or has replaced its algorithm.
+  bool has_current_entry(const btBroadphasePair& pair, std::size_t i) const {
+    return !is_changed_ && i < pairs_.size() && batch_.is_entry_of(pair, i);
   }
 
   void visit_stock(btBroadphasePair& pair) const {
     (*dispatcher_.getNearCallback())(pair, dispatcher_, info_);
   }
+  /// The rest of btCollisionDispatcher::defaultNearCallback after needsCollision() is true.
+  void run_algorithm(btBroadphasePair& pair, btCollisionObject& a, btCollisionObject& b) const {
+    const btCollisionObjectWrapper wrapper_a = wrapper_of(a), wrapper_b = wrapper_of(b);
+    if (pair.m_algorithm == nullptr) {
+      pair.m_algorithm =
+          dispatcher_.findAlgorithm(&wrapper_a, &wrapper_b, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+    }
+    if (pair.m_algorithm == nullptr) return;
+    btManifoldResult result(&wrapper_a, &wrapper_b);
+    pair.m_algorithm->processCollision(&wrapper_a, &wrapper_b, info_, &result);
+  }
 
+  /// Returns false if user code may have prevented or changed the update of a pair of spheres.
   bool visit(std::size_t i, btBroadphasePair& pair) {
     // A callback may set a near callback during the traversal.
-    if (dispatcher_.getNearCallback() != &btCollisionDispatcher::defaultNearCallback) {
+    if ((actions_[i] == Action::stock && convex_ == nullptr) ||
+        dispatcher_.getNearCallback() != &btCollisionDispatcher::defaultNearCallback) {
       visit_stock(pair);
       return false;
     }
-    const btCollisionObject *a = batch_.body_a(i), *b = batch_.body_b(i);
-    switch (actions_[i]) {
+    return visit_default(i, pair);
+  }
+  bool visit_default(std::size_t i, btBroadphasePair& pair) {
+    const Action action = actions_[i];
+    if (action == Action::skip && is_still_apart(i)) return true;
+    // If a callback has replaced the bodies of a pair without an algorithm, the batch has others.
+    auto& a = *static_cast<btCollisionObject*>(pair.m_pProxy0->m_clientObject);
+    auto& b = *static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+    if (!dispatcher_.needsCollision(&a, &b)) return action != Action::commit;
+    note_changes(i, pair);
+    if (is_changed_ || !batch_.is_entry_of(pair, i)) {
+      run_algorithm(pair, a, b);
+      return false;
+    }
+    switch (action) {
       case Action::stock:
-        if (convex_ == nullptr || !has_sphere(batch_, i)) {
-          visit_stock(pair);
-        } else if (dispatcher_.needsCollision(a, b)) {
-          commit_in_order(*convex_, i, &counts_);
-        }
+        if (!commit_other(i, a, b)) run_algorithm(pair, a, b);
         return true;
       case Action::skip:
-        return true;
       case Action::filter:
-        dispatcher_.needsCollision(a, b);
-        return true;
+        if (is_still_apart(i)) return true;
+        run_algorithm(pair, a, b);
+        return false;
       case Action::commit:
         break;
     }
-    btPersistentManifold* manifold = batch_.manifold(i);
-    // Evaluated for every contact, because a callback may set another callback.
+    // Evaluated for every contact, because a callback may have changed it.
     const PairContact* contact = contacts_[i] != kNone ? &touching_[contacts_[i]] : nullptr;
     const bool is_not_finite = contact != nullptr && !has_finite_values(*contact);
-    is_changed_ = !batch_.has_current_spheres(i);
-    if (is_changed_ || materials_are_combined_by_user() || is_not_finite ||
-        !is_plain(*manifold, *a, *b)) {
-      visit_stock(pair);
-      return false;  // the near callback calls the filter itself and does not return its result
+    if (!batch_.has_current_spheres(i) || materials_are_combined_by_user() || is_not_finite ||
+        !is_plain(*batch_.manifold(i), a, b)) {
+      run_algorithm(pair, a, b);
+      return false;
     }
-    if (!dispatcher_.needsCollision(a, b)) return false;
+    return commit_spheres(i, contact, a, b);
+  }
+
+  /// Whether two spheres that were apart, without a contact point, still are.
+  bool is_still_apart(std::size_t i) const {
+    return batch_.manifold(i)->getNumContacts() == 0 && batch_.has_current_spheres(i);
+  }
+
+  /// Updates a pair that is not two spheres. Returns false if Bullet's algorithm must run.
+  bool commit_other(std::size_t i, const btCollisionObject& a, const btCollisionObject& b) {
+    if (!is_observed(a, b)) return commit_unobserved(*convex_, i, &counts_);
+    if (!has_sphere(batch_, i)) return false;
+    commit_in_order(*convex_, i, &counts_);
+    return true;
+  }
+
+  /// Returns false if callbacks may have changed the point.
+  bool commit_spheres(std::size_t i, const PairContact* contact, const btCollisionObject& a,
+                      const btCollisionObject& b) {
+    btPersistentManifold* manifold = batch_.manifold(i);
     ++counts_.written;
-    if (!contacts_are_observed() && !calls_added(*a, *b)) {
+    if (!contacts_are_observed() && !calls_added(a, b)) {
       manifold->setNumContacts(0);
       // Reads the current materials, because callbacks may change those of their bodies.
       if (contact != nullptr) {
-        write_contact(manifold, *contact, state_of(*a), state_of(*b), batch_.radius_b(i));
+        write_contact(manifold, *contact, state_of(a), state_of(b), batch_.radius_b(i));
       }
       return true;
     }
@@ -134,8 +215,8 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     // has the distance from before these calls, and all else from after them.
     const Real radius_b = batch_.radius_b(i);
     manifold->clearManifold();
-    if (contact != nullptr) add_observed(manifold, *contact, *a, *b, radius_b);
-    return false;  // callbacks may have changed the point
+    if (contact != nullptr) add_observed(manifold, *contact, a, b, radius_b);
+    return false;
   }
 
   /// Adds the point of a touching pair to an empty manifold, and calls gContactAddedCallback and
@@ -204,12 +285,24 @@ CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairC
   return counts;
 }
 
+void OrderedCommit::process_default(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
+                                    const btDispatcherInfo& info) {
+  ++default_calls_;
+  if (running_ != nullptr && running_->process_default(pair, dispatcher)) return;
+  btCollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
+}
+
 CommitCounts OrderedCommit::run(btCollisionDispatcher& dispatcher, btOverlappingPairCache& cache,
                                 const btDispatcherInfo& info, btDispatcher* argument,
                                 const SphereBatch& batch, std::span<const btBroadphasePair> pairs,
                                 std::span<const PairContact> touching, const ConvexDispatch* convex,
                                 const Visited& visited) {
   Walk walk(*this, dispatcher, cache, info, batch, pairs, touching, convex, visited);
+  struct Restore {
+    ~Restore() { running_ = before; }
+    Walk* before;
+  };
+  const Restore restore{std::exchange(running_, &walk)};  // also if a callback throws
   cache.processAllOverlappingPairs(&walk, argument, info);
   return walk.counts();
 }

@@ -3,6 +3,7 @@
 
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/reveal.hpp"
 
 #include <BulletCollision/CollisionDispatch/btBoxBoxCollisionAlgorithm.h>
 #include <BulletCollision/CollisionDispatch/btConvexConcaveCollisionAlgorithm.h>
@@ -19,18 +20,10 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
-namespace {
 
-constexpr std::size_t kAhead = 16;
-
-struct AlgorithmFields : btCollisionAlgorithm {
-  static constexpr auto dispatcher = &AlgorithmFields::m_dispatcher;
-};
-
-/// Access to private members through explicit instantiation, which the language exempts from access
-/// checks. Of a btConvexConvexAlgorithm: the number of perturbations and the penetration depth
-/// solver, which it copies from its configuration. Of a btConvexPlaneCollisionAlgorithm and a
-/// btConvexConcaveCollisionAlgorithm: whether the plane or concave shape is the first body.
+// Of a btConvexConvexAlgorithm: the number of perturbations and the penetration depth solver, which
+// it copies from its configuration. Of a btConvexPlaneCollisionAlgorithm and a
+// btConvexConcaveCollisionAlgorithm: whether the plane or concave shape is the first body.
 struct PerturbationTag {
   friend int btConvexConvexAlgorithm::*member_of(PerturbationTag);
 };
@@ -43,14 +36,18 @@ struct PlaneFirstTag {
 struct ConcaveFirstTag {
   friend bool btConvexConcaveCollisionAlgorithm::*member_of(ConcaveFirstTag);
 };
-template <class Tag, auto Member>
-struct Reveal {
-  friend auto member_of(Tag) -> decltype(Member) { return Member; }
-};
 template struct Reveal<PerturbationTag, &btConvexConvexAlgorithm::m_numPerturbationIterations>;
 template struct Reveal<DepthSolverTag, &btConvexConvexAlgorithm::m_pdSolver>;
 template struct Reveal<PlaneFirstTag, &btConvexPlaneCollisionAlgorithm::m_isSwapped>;
 template struct Reveal<ConcaveFirstTag, &btConvexConcaveCollisionAlgorithm::m_isSwapped>;
+
+namespace {
+
+constexpr std::size_t kAhead = 16;
+
+struct AlgorithmFields : btCollisionAlgorithm {
+  static constexpr auto dispatcher = &AlgorithmFields::m_dispatcher;
+};
 
 /// Whether Bullet's EPA computes the penetration of deep contacts. Unlike
 /// btMinkowskiPenetrationDepthSolver, it has no state shared by threads.
@@ -150,7 +147,7 @@ std::size_t PairTable::find_changed(std::span<const btBroadphasePair> pairs, std
   return count;
 }
 
-PairTable::Link PairTable::read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner) {
+PairLink read_link(btCollisionAlgorithm* algorithm, const btDispatcher* owner) {
   if (algorithm == nullptr) return {};
   const std::type_info* type = type_info_of(*algorithm);
   btPersistentManifold* manifold = nullptr;
@@ -173,14 +170,14 @@ PairTable::Link PairTable::read_link(btCollisionAlgorithm* algorithm, const Pair
     kind = PairKind::boxes;
   } else if (type == &typeid(btConvexConcaveCollisionAlgorithm)) {
     // Creates the algorithms for triangles through its own dispatcher.
-    if (algorithm->*AlgorithmFields::dispatcher != owner.dispatcher) return {};
+    if (algorithm->*AlgorithmFields::dispatcher != owner) return {};
     auto* concave = static_cast<btConvexConcaveCollisionAlgorithm*>(algorithm);
     manifold = manifold_of<btConvexConcaveCollisionAlgorithm>(algorithm);
     kind = concave->*member_of(ConcaveFirstTag()) ? PairKind::concave_convex
                                                   : PairKind::convex_concave;
   }
-  if (!Link::can_hold(manifold)) return {};
-  return {manifold, kind, algorithm->*AlgorithmFields::dispatcher == owner.dispatcher};
+  if (!PairLink::can_hold(manifold)) return {};
+  return {manifold, kind, algorithm->*AlgorithmFields::dispatcher == owner};
 }
 
 void PairTable::update(std::span<const btBroadphasePair> pairs,
@@ -204,7 +201,7 @@ void PairTable::update(std::span<const btBroadphasePair> pairs,
       }
     }
     key = {pair.m_pProxy0, pair.m_pProxy1, pair.m_algorithm};
-    links_[i] = read_link(pair.m_algorithm, owner);
+    links_[i] = read_link(pair.m_algorithm, owner.dispatcher);
   }
 }
 
@@ -234,7 +231,7 @@ void PairTable::refresh(std::span<const btBroadphasePair> pairs, const PairOwner
       if (i + kAhead < end) {
         prefetch_ends(pairs[i + kAhead].m_algorithm, sizeof(btSphereSphereCollisionAlgorithm));
       }
-      links_[i] = read_link(pairs[i].m_algorithm, owner);
+      links_[i] = read_link(pairs[i].m_algorithm, owner.dispatcher);
     }
   });
 }

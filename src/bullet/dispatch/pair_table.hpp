@@ -52,6 +52,34 @@ struct PairOwner {
   bool reports_releases;
 };
 
+/// The manifold and the kind of a pair, and whether they may be cached; otherwise they are reread
+/// in every dispatch. Packed into one word, because every dispatch streams all links twice.
+class PairLink {
+ public:
+  PairLink() = default;
+  PairLink(btPersistentManifold* manifold, PairKind kind, bool cacheable)
+      : bits_(reinterpret_cast<std::uintptr_t>(manifold) | static_cast<std::uintptr_t>(kind) |
+              (cacheable ? 0 : kNotCacheable)) {}
+  /// False for null, and for a manifold whose alignment is lower than that of Bullet's pools.
+  static bool can_hold(const btPersistentManifold* manifold) {
+    return manifold != nullptr &&
+           (reinterpret_cast<std::uintptr_t>(manifold) & (kKind | kNotCacheable)) == 0;
+  }
+  btPersistentManifold* manifold() const {
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the word also holds the kind
+    return reinterpret_cast<btPersistentManifold*>(bits_ & ~(kKind | kNotCacheable));
+  }
+  PairKind kind() const { return static_cast<PairKind>(bits_ & kKind); }
+  bool cacheable() const { return (bits_ & kNotCacheable) == 0; }
+
+ private:
+  static constexpr std::uintptr_t kKind = 7, kNotCacheable = 8;
+  std::uintptr_t bits_ = 0;
+};
+/// Reads the class and the manifold of an algorithm; PairKind::other for null. `owner` is the
+/// dispatcher that runs the dispatch.
+PairLink read_link(btCollisionAlgorithm* algorithm, const btDispatcher* owner);
+
 /// One entry per pair, in the order of the pair array. An entry is valid while the array contains
 /// the same proxies and the same algorithm, and the algorithm's manifold has not been released. No
 /// cached pointer is dereferenced before this check.
@@ -80,32 +108,6 @@ class PairTable {
   }
 
  private:
-  /// The manifold and the kind of a pair, and whether they may be cached; otherwise they are reread
-  /// in every dispatch. Packed into one word, because every dispatch streams all links twice.
-  class Link {
-   public:
-    Link() = default;
-    Link(btPersistentManifold* manifold, PairKind kind, bool cacheable)
-        : bits_(reinterpret_cast<std::uintptr_t>(manifold) | static_cast<std::uintptr_t>(kind) |
-                (cacheable ? 0 : kNotCacheable)) {}
-    /// False for null, and for a manifold whose alignment is lower than that of Bullet's pools.
-    static bool can_hold(const btPersistentManifold* manifold) {
-      return manifold != nullptr &&
-             (reinterpret_cast<std::uintptr_t>(manifold) & (kKind | kNotCacheable)) == 0;
-    }
-    btPersistentManifold* manifold() const {
-      // NOLINTNEXTLINE(performance-no-int-to-ptr): the word also holds the kind
-      return reinterpret_cast<btPersistentManifold*>(bits_ & ~(kKind | kNotCacheable));
-    }
-    PairKind kind() const { return static_cast<PairKind>(bits_ & kKind); }
-    bool cacheable() const { return (bits_ & kNotCacheable) == 0; }
-
-   private:
-    static constexpr std::uintptr_t kKind = 7, kNotCacheable = 8;
-    std::uintptr_t bits_ = 0;
-  };
-  static Link read_link(btCollisionAlgorithm* algorithm, const PairOwner& owner);
-
   struct Key {
     const btBroadphaseProxy* proxy0 = nullptr;
     const btBroadphaseProxy* proxy1 = nullptr;
@@ -124,7 +126,7 @@ class PairTable {
   ProxyTable proxies_;
   std::vector<Key> keys_;
   std::vector<SpherePair> pairs_;
-  std::vector<Link> links_;
+  std::vector<PairLink> links_;
   std::vector<std::uint32_t> changed_;
   std::vector<std::size_t> changed_counts_;  ///< by chunk
   std::vector<const btPersistentManifold*> released_;

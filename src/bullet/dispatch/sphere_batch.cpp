@@ -8,6 +8,7 @@
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -38,9 +39,19 @@ bool is_one_of(const btCollisionShape& shape) {
   return (is_exactly<Exact>(shape) || ...);
 }
 
-/// The traits of a shape that is not a sphere.
+bool is_wrapped_sphere(const btCollisionShape& shape) {
+  if (shape.getShapeType() != COMPOUND_SHAPE_PROXYTYPE) return false;
+  const auto& compound = static_cast<const btCompoundShape&>(shape);
+  return compound.getNumChildShapes() > 0 &&
+         compound.getChildShape(0)->getShapeType() == SPHERE_SHAPE_PROXYTYPE;
+}
+
+}  // namespace
+
 unsigned traits_of(const btCollisionShape& shape) {
   switch (shape.getShapeType()) {
+    case SPHERE_SHAPE_PROXYTYPE:
+      return kSphere;
     case BOX_SHAPE_PROXYTYPE:
       return is_exactly<btBoxShape>(shape) ? kBox | kConvex : 0;
     case STATIC_PLANE_PROXYTYPE:
@@ -55,8 +66,6 @@ unsigned traits_of(const btCollisionShape& shape) {
       return 0;
   }
 }
-
-}  // namespace
 
 std::uint8_t SphereBatch::read_body(std::size_t number) {
   constexpr Real kNaN = std::numeric_limits<Real>::quiet_NaN();
@@ -133,6 +142,7 @@ SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end
     summary.traits |= traits_[k];
     summary.collision_flags |= bodies_[k]->getCollisionFlags();
     summary.spheres += (traits_[k] & kSphere) != 0 ? 1 : 0;
+    summary.wrapped_spheres += is_wrapped_sphere(*bodies_[k]->getCollisionShape()) ? 1 : 0;
   }
   return summary;
 }
@@ -157,9 +167,11 @@ std::size_t SphereBatch::gather(std::span<const btBroadphasePair> pairs, const P
     all.traits |= part.traits;
     all.collision_flags |= part.collision_flags;
     all.spheres += part.spheres;
+    all.wrapped_spheres += part.wrapped_spheres;
   }
   any_trait_ = all.traits;
   any_collision_flag_ = all.collision_flags;
+  wrapped_spheres_ = all.wrapped_spheres;
   return all.spheres;
 }
 

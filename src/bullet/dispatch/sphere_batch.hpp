@@ -28,6 +28,9 @@ enum BodyTrait : std::uint8_t {
   kConvex = 128,         ///< exactly one of Bullet's boxes, capsules, cylinders or cones
 };
 
+/// The traits of a body with this shape that follow from the shape.
+unsigned traits_of(const btCollisionShape& shape);
+
 /// The first contact of pair `pair` or of a later pair.
 inline const PairContact* first_contact(std::span<const PairContact> touching, std::size_t pair) {
   return std::lower_bound(
@@ -86,6 +89,8 @@ class SphereBatch {
   unsigned either_trait(std::size_t i) const {
     return static_cast<unsigned>(trait_a(i) | trait_b(i));
   }
+  /// The number of bodies that are compounds whose first child is a sphere.
+  std::size_t wrapped_spheres() const { return wrapped_spheres_; }
   /// Unions of the traits and of the collision flags of all bodies.
   unsigned any_trait() const { return any_trait_; }
   int any_collision_flag() const { return any_collision_flag_; }
@@ -95,6 +100,7 @@ class SphereBatch {
     unsigned traits = 0;
     int collision_flags = 0;
     std::size_t spheres = 0;
+    std::size_t wrapped_spheres = 0;
   };
 
   PackedBody state(SphereIndex number) const {
@@ -115,6 +121,7 @@ class SphereBatch {
   unsigned any_trait_ = 0;
   int any_collision_flag_ = 0;
   int special_flags_ = 0;
+  std::size_t wrapped_spheres_ = 0;
   std::size_t expected_contacts_ = 0;
 };
 

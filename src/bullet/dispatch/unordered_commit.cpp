@@ -23,14 +23,6 @@ constexpr std::size_t kConvexAhead = 4;
 /// Minimum number of pairs for several threads: below, waking threads takes longer.
 constexpr std::size_t kSharedConvexPairs = 512;
 
-void prefetch_convex(const SphereBatch& batch, std::size_t i) {
-  if (batch.manifold(i) == nullptr) return;
-  prefetch_header(batch.manifold(i));
-  prefetch_first_point(batch.manifold(i));
-  prefetch_for_contact(*batch.body_a(i));
-  prefetch_for_contact(*batch.body_b(i));
-}
-
 /// Commits the pairs of spheres among the pairs [begin, end).
 class Committer {
  public:
@@ -215,7 +207,9 @@ CommitCounts UnorderedCommit::commit_convex_pairs(const ConvexDispatch& dispatch
     const std::size_t begin = chunk * size, end = std::min(n, begin + size);
     Chunk part;
     for (std::size_t k = begin; k < end; ++k) {
-      if (k + kConvexAhead < end) prefetch_convex(dispatch.batch, remaining_[k + kConvexAhead]);
+      if (k + 2 * kConvexAhead < end)
+        prefetch_algorithm(dispatch, remaining_[k + 2 * kConvexAhead]);
+      if (k + kConvexAhead < end) prefetch_convex(dispatch, remaining_[k + kConvexAhead]);
       const std::uint32_t i = remaining_[k];
       if (!commit_convex(dispatch, i, &part.counts)) remaining_[begin + part.remaining++] = i;
     }

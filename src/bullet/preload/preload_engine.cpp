@@ -54,6 +54,7 @@ DispatchStats sum_of_stats(std::string_view* backend) {
     sum.convex_pairs += stats.convex_pairs;
     sum.sphere_concaves += stats.sphere_concaves;
     sum.concave_pairs += stats.concave_pairs;
+    sum.compound_pairs += stats.compound_pairs;
     for (std::size_t i = 0; i < kConcaveFallbackCount; ++i) {
       sum.concave_fallbacks[i] += stats.concave_fallbacks[i];
     }
