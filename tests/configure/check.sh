@@ -30,7 +30,7 @@ case $step in
     ;;
   no_tool)
     accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TOOL=OFF -DJFPX_TESTS=ON
-    said "viewer off (JFPX_TOOL=OFF)" || fail "the summary says nothing of the viewer: $(cat "$work/log")"
+    said "viewer off (JFPX_TOOL=OFF," || fail "the summary says nothing of the viewer: $(cat "$work/log")"
     refuses "JFPX_TOOL=OFF, which turns all programs off" -S "$root" -DJFPX_VIEWER=ON -DJFPX_TOOL=OFF
     refuses "JFPX_TOOL=OFF, which turns all programs off" -S "$root" -DJFPX_ASSIMP=ON -DJFPX_TOOL=OFF
     ;;
