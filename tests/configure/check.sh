@@ -41,6 +41,13 @@ case $step in
       rm -r "$work/build"
     done
     ;;
+  # -m32 does not change the name of the processor. Nothing is linked, because few machines have libraries of 32 bits.
+  bits)
+    "$CXX" -m32 -c -x c++ /dev/null -o "$work/empty.o" 2>/dev/null ||
+      { echo "skipped: $CXX does not compile for 32 bits"; exit 0; }
+    refuses "The compiler builds programs of 32 bits" -S "$root" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF \
+      -DCMAKE_CXX_FLAGS=-m32 -DCMAKE_TRY_COMPILE_TARGET_TYPE=STATIC_LIBRARY
+    ;;
   # An nvcc that does not know our architectures, or is none, is left out before CMake tries it.
   cuda)
     printf '#!/bin/sh\necho "Cuda compilation tools, release 11.5, V11.5.119"\n' >"$work/old"
