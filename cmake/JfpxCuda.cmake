@@ -2,18 +2,13 @@
 # a program with the backend starts on a machine without a driver and can report it.
 set(JFPX_HAS_CUDA OFF)
 if(JFPX_CUDA STREQUAL "OFF")
-  jfpx_summary(cuda off "JFPX_CUDA=OFF")
-  return()
+  jfpx_without(cuda "JFPX_CUDA=OFF")
 endif()
 
-# Continues without the backend, unless JFPX_CUDA=ON. The next configuration searches again.
+# The next configuration searches again.
 macro(jfpx_without_cuda why remedy)
   unset(CMAKE_CUDA_COMPILER CACHE)
-  if(JFPX_CUDA STREQUAL "ON")
-    message(FATAL_ERROR "JFPX_CUDA=ON, but ${why}. ${remedy}, or configure with -DJFPX_CUDA=OFF.")
-  endif()
-  jfpx_summary(cuda off "${why}")
-  return()
+  jfpx_without(cuda "${why}" "${remedy}, or configure with -DJFPX_CUDA=OFF.")
 endmacro()
 include(CheckLanguage)
 check_language(CUDA)

@@ -7,6 +7,9 @@ elseif(JFPX_PROCESSOR MATCHES "^(aarch64|arm64)$")
 else()
   message(FATAL_ERROR "The processor is \"${CMAKE_SYSTEM_PROCESSOR}\"; jfpx supports x86_64 and aarch64.")
 endif()
+if(CMAKE_SIZEOF_VOID_P EQUAL 4) # x86 computes in the x87 unit there, which rounds to other values
+  message(FATAL_ERROR "The compiler builds programs of 32 bits; jfpx takes 64.")
+endif()
 
 # Bit-exact results require that each operation is rounded once. g++ and clang contract a*b+c to FMA if the
 # target supports it, which every ARM64 processor does. Users inline the headers of jfpx and Bullet, so the

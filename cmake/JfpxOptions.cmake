@@ -58,6 +58,17 @@ function(jfpx_summary name state reason)
   set(JFPX_SUMMARY "${JFPX_SUMMARY};${name}|${state}|${reason}" CACHE INTERNAL "")
 endfunction()
 
+# jfpx_without(NAME REASON [REMEDY]): returns from the file that calls it, without the part of the option JFPX_<NAME>;
+# an error, with the remedy, if the option is ON. A macro, because a function would return from itself.
+macro(jfpx_without name reason)
+  string(TOUPPER "${name}" jfpx_option)
+  if(JFPX_${jfpx_option} STREQUAL "ON")
+    message(FATAL_ERROR "JFPX_${jfpx_option}=ON, but ${reason}. " ${ARGN})
+  endif()
+  jfpx_summary(${name} off "${reason}")
+  return()
+endmacro()
+
 function(jfpx_print_summary)
   set(kind static)
   if(BUILD_SHARED_LIBS)

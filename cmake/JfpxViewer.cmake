@@ -2,16 +2,11 @@
 # because Debian's imgui and epoxy have no CMake files.
 set(JFPX_HAS_VIEWER OFF)
 if(JFPX_VIEWER STREQUAL "OFF")
-  jfpx_summary(viewer off "JFPX_VIEWER=OFF")
-  return()
+  jfpx_without(viewer "JFPX_VIEWER=OFF")
 endif()
 if(NOT JFPX_TOOL)
-  if(JFPX_VIEWER STREQUAL "ON")
-    message(FATAL_ERROR "JFPX_VIEWER=ON, but JFPX_TOOL=OFF, which turns all programs off. "
-      "Configure with -DJFPX_TOOL=ON or without the viewer.")
-  endif()
-  jfpx_summary(viewer off "JFPX_TOOL=OFF")
-  return()
+  jfpx_without(viewer "JFPX_TOOL=OFF, which turns all programs off"
+    "Configure with -DJFPX_TOOL=ON or without the viewer.")
 endif()
 
 find_package(PkgConfig)
@@ -19,12 +14,7 @@ if(PKG_CONFIG_FOUND)
   pkg_check_modules(JFPX_VIEWER3RD IMPORTED_TARGET sdl2>=2.0.22 epoxy imgui>=1.84 stb libpng)
 endif()
 if(NOT JFPX_VIEWER3RD_FOUND)
-  set(reason "pkg-config does not find sdl2, epoxy, imgui, stb and libpng: run scripts/setup")
-  if(JFPX_VIEWER STREQUAL "ON")
-    message(FATAL_ERROR "JFPX_VIEWER=ON, but ${reason}.")
-  endif()
-  jfpx_summary(viewer off "${reason}")
-  return()
+  jfpx_without(viewer "pkg-config does not find sdl2, epoxy, imgui, stb and libpng: run scripts/setup")
 endif()
 
 set(JFPX_HAS_VIEWER ON)

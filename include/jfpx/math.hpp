@@ -8,6 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#if defined(__MINGW32__) && defined(__x86_64__)
+#include <emmintrin.h>
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -19,9 +22,21 @@ inline constexpr Real kMaxReal = (std::numeric_limits<Real>::max)();  // not the
 inline constexpr Real kPi = static_cast<Real>(3.14159265358979323846);
 
 /// Correctly rounded square root, with the same bits from nvcc and the host compilers.
-JFPX_HD inline Real square_root(Real x) {
+JFPX_HD inline float square_root(float x) {
 #if defined(__CUDA_ARCH__)
   return ::sqrt(x);
+#else
+  return std::sqrt(x);
+#endif
+}
+JFPX_HD inline double square_root(double x) {
+#if defined(__CUDA_ARCH__)
+  return ::sqrt(x);
+#elif defined(__MINGW32__) && defined(__x86_64__)
+  // sqrt() of MinGW-w64 rounds twice, first to the format of the x87 unit. Optimized code does not
+  // call it, other code does.
+  const __m128d v = _mm_set_sd(x);
+  return _mm_cvtsd_f64(_mm_sqrt_sd(v, v));
 #else
   return std::sqrt(x);
 #endif

@@ -75,7 +75,7 @@ Quat from_axis_angle(const Vec3& axis, Real angle) {
 Quat axes_along(const Vec3& axis) {
   const auto x = static_cast<double>(axis.x), y = static_cast<double>(axis.y),
              z = static_cast<double>(axis.z);
-  const double size = std::sqrt(x * x + y * y + z * z);
+  const double size = square_root(x * x + y * y + z * z);
   if (!(size > static_cast<double>(kEpsilon)) || !std::isfinite(size)) {
     throw InvalidArgument("axis is (" + text(axis.x) + ", " + text(axis.y) + ", " + text(axis.z) +
                           "); it must be finite and longer than " + text(kEpsilon));
@@ -83,7 +83,7 @@ Quat axes_along(const Vec3& axis) {
   // 1 + x, without the cancellation near the opposite direction.
   const double across2 = y * y + z * z;
   const double w = x > 0 ? size + x : across2 / (size - x);
-  const double length = std::sqrt(w * w + across2);
+  const double length = square_root(w * w + across2);
   if (!(length > 0)) return {0, 0, 1, 0};  // half a turn about y
   return {static_cast<Real>(w / length), 0, static_cast<Real>(-z / length),
           static_cast<Real>(y / length)};

@@ -22,11 +22,9 @@ JFPX_API std::string to_text(const std::filesystem::path& path);
 /// std::fopen(). @return null, with errno set, if the file can't be opened
 JFPX_API std::FILE* open_file(const std::string& path, const char* mode);
 
-/// The value of an environment variable that names a folder. Empty if it is not set, or not
-/// absolute.
-JFPX_API std::filesystem::path folder_from_environment(const char* variable);
 /// The folder for files that can be made again: XDG_CACHE_HOME or .cache in HOME (XDG base
-/// directory specification); on Windows, LOCALAPPDATA. Empty if the environment names none.
+/// directory specification); on Windows, LOCALAPPDATA. Empty if the environment names none, or not
+/// by an absolute path.
 JFPX_API std::filesystem::path cache_folder();
 /// The variable that is missing if cache_folder() is empty, for error messages.
 JFPX_API extern const char* const kCacheFolderVariable;

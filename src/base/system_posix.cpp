@@ -15,6 +15,17 @@ inline namespace JFPX_ABI {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Empty if the variable is not set, or its value is not absolute.
+fs::path folder_from_environment(const char* variable) {
+  const char* const value = std::getenv(variable);
+  if (value == nullptr || !fs::path(value).is_absolute()) return {};
+  return value;
+}
+
+}  // namespace
+
 const char* const kCacheFolderVariable = "HOME";
 
 fs::path to_path(const std::string& text) { return text; }
@@ -22,12 +33,6 @@ std::string to_text(const fs::path& path) { return path.string(); }
 
 std::FILE* open_file(const std::string& path, const char* mode) {
   return std::fopen(path.c_str(), mode);
-}
-
-fs::path folder_from_environment(const char* variable) {
-  const char* const value = std::getenv(variable);
-  if (value == nullptr || !fs::path(value).is_absolute()) return {};
-  return value;
 }
 
 fs::path cache_folder() {

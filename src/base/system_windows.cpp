@@ -66,13 +66,11 @@ std::FILE* open_file(const std::string& path, const char* mode) {
   return ::_wfopen(to_path(path).c_str(), widened(mode).c_str());
 }
 
-fs::path folder_from_environment(const char* variable) {
-  const wchar_t* const value = ::_wgetenv(widened(variable).c_str());
+fs::path cache_folder() {
+  const wchar_t* const value = ::_wgetenv(L"LOCALAPPDATA");
   if (value == nullptr || !fs::path(value).is_absolute()) return {};
   return value;
 }
-
-fs::path cache_folder() { return folder_from_environment("LOCALAPPDATA"); }
 
 void wait_while_equal(const std::atomic<std::uint32_t>& value, std::uint32_t old) noexcept {
   static_assert(sizeof value == sizeof old);

@@ -32,13 +32,7 @@ struct TriangleArea {
   double size = 0;
 
   JFPX_HD TriangleArea(const Vec3& a, const Vec3& b, const Vec3& c)
-      : normal(cross(difference(b, a), difference(c, b))) {
-#if defined(__CUDA_ARCH__)
-    size = ::sqrt(dot(normal, normal));
-#else
-    size = std::sqrt(dot(normal, normal));
-#endif
-  }
+      : normal(cross(difference(b, a), difference(c, b))), size(square_root(dot(normal, normal))) {}
   JFPX_HD Vec3 unit_normal() const {
     return {static_cast<Real>(normal.x / size), static_cast<Real>(normal.y / size),
             static_cast<Real>(normal.z / size)};

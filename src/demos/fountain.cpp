@@ -31,7 +31,7 @@ constexpr Real kRim = Real(0.6);       // [m], height of the basin
 /// Number of sites along an edge of the nozzle. Each site emits at most 60 balls per second, so
 /// that successive balls do not overlap.
 Real nozzle_side(std::uint32_t balls) {
-  return std::max(Real(1), std::ceil(std::sqrt(static_cast<Real>(balls) / Real(60 * kLifetime))));
+  return std::max(Real(1), std::ceil(square_root(static_cast<Real>(balls) / Real(60 * kLifetime))));
 }
 
 class Fountain final : public Demo {

@@ -18,8 +18,8 @@ void rotate(Matrix* tensor, Matrix* axes, int p, int q) {
   Matrix& m = *tensor;
   if (m[p][q] == 0) return;
   const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-  const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-  const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+  const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + square_root(theta * theta + 1));
+  const double c = 1 / square_root(t * t + 1), s = t * c;
   const auto rotate_pair = [c, s](double* first, double* second) {
     const double x = *first, y = *second;
     *first = c * x - s * y;

@@ -2,6 +2,7 @@
 #include <jfpx/backend.hpp>
 
 #include "src/base/sanitizers.hpp"
+#include "tests/support/environment.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -16,6 +17,7 @@
 namespace jfpx {
 namespace {
 
+using test::EnvironmentVariable;
 using test::ProcessResult;
 using test::run_process;
 using ::testing::ContainsRegex;
@@ -24,15 +26,17 @@ using ::testing::Not;
 
 class Preload : public ::testing::Test {
  protected:
-  // For sanitizer builds, whose run-time library must otherwise be the first of a program.
-  Preload() { setenv("ASAN_OPTIONS", "verify_asan_link_order=0:detect_leaks=0", 1); }
-
   static ProcessResult jfpx_command(const std::string& arguments) {
     return run_process(JFPX_TOOL_PATH " " + arguments);
   }
   static ProcessResult alone(const std::string& arguments) {
     return run_process(JFPX_STOCK_PROGRAM " " + arguments);
   }
+
+ private:
+  // For sanitizer builds, whose run-time library must otherwise be the first of a program.
+  const EnvironmentVariable asan_options_{"ASAN_OPTIONS",
+                                          "verify_asan_link_order=0:detect_leaks=0"};
 };
 
 /// Whether the program of environment_program.cpp prints the same with all parts of jfpx.
@@ -109,14 +113,10 @@ TEST_F(Preload, EnablesOnlyTheRequestedParts) {
 
 TEST_F(Preload, ReportsInvalidSettingsAndIgnoresThem) {
   const std::string stock = alone("300").output;
-  setenv("JFPX_PRELOAD_THREADS", "300", 1);
-  setenv("JFPX_PRELOAD_BACKEND", "gpu", 1);
-  setenv("JFPX_PRELOAD_MINIMUM_BATCH", "-1", 1);
+  const EnvironmentVariable threads("JFPX_PRELOAD_THREADS", "300");
+  const EnvironmentVariable backend("JFPX_PRELOAD_BACKEND", "gpu");
+  const EnvironmentVariable minimum("JFPX_PRELOAD_MINIMUM_BATCH", "-1");
   const ProcessResult ours = jfpx_command("preload -- " JFPX_STOCK_PROGRAM " 300 2>&1");
-  for (const char* name :
-       {"JFPX_PRELOAD_THREADS", "JFPX_PRELOAD_BACKEND", "JFPX_PRELOAD_MINIMUM_BATCH"}) {
-    unsetenv(name);
-  }
   EXPECT_EQ(ours.status, 0);
   EXPECT_THAT(ours.output, HasSubstr(stock));
   EXPECT_THAT(ours.output, HasSubstr("JFPX_PRELOAD_THREADS is \"300\"; it must be 0 to 256."));
@@ -126,10 +126,9 @@ TEST_F(Preload, ReportsInvalidSettingsAndIgnoresThem) {
 
 TEST_F(Preload, ReportsAMissingGpuAndLeavesEverythingToBullet) {
   if (available_backends()[1].usable) GTEST_SKIP() << "a GPU is usable";
-  setenv("JFPX_PRELOAD_BACKEND", "cuda", 1);
+  const EnvironmentVariable backend("JFPX_PRELOAD_BACKEND", "cuda");
   const ProcessResult ours =
       jfpx_command("preload --summary --minimum-batch 0 -- " JFPX_STOCK_PROGRAM " 300 2>&1");
-  unsetenv("JFPX_PRELOAD_BACKEND");
   EXPECT_EQ(ours.status, 0);
   EXPECT_THAT(ours.output, HasSubstr(alone("300").output));
   EXPECT_THAT(ours.output, HasSubstr(": 0 dispatches, 0 batches (none)\n"));

@@ -30,7 +30,7 @@ case $step in
     ;;
   no_tool)
     accepts -S "$root" -DJFPX_CUDA=OFF -DJFPX_TOOL=OFF -DJFPX_TESTS=ON
-    said "viewer off (JFPX_TOOL=OFF)" || fail "the summary says nothing of the viewer: $(cat "$work/log")"
+    said "viewer off (JFPX_TOOL=OFF," || fail "the summary says nothing of the viewer: $(cat "$work/log")"
     refuses "JFPX_TOOL=OFF, which turns all programs off" -S "$root" -DJFPX_VIEWER=ON -DJFPX_TOOL=OFF
     refuses "JFPX_TOOL=OFF, which turns all programs off" -S "$root" -DJFPX_ASSIMP=ON -DJFPX_TOOL=OFF
     ;;
@@ -40,6 +40,13 @@ case $step in
         -S "$root" -DJFPX_CUDA=OFF -DCMAKE_INSTALL_$folder=/usr/x -DJFPX_VIEWER=OFF
       rm -r "$work/build"
     done
+    ;;
+  # -m32 does not change the name of the processor. Nothing is linked, because few machines have libraries of 32 bits.
+  bits)
+    "$CXX" -m32 -c -x c++ /dev/null -o "$work/empty.o" 2>/dev/null ||
+      { echo "skipped: $CXX does not compile for 32 bits"; exit 0; }
+    refuses "The compiler builds programs of 32 bits" -S "$root" -DJFPX_CUDA=OFF -DJFPX_VIEWER=OFF \
+      -DCMAKE_CXX_FLAGS=-m32 -DCMAKE_TRY_COMPILE_TARGET_TYPE=STATIC_LIBRARY
     ;;
   # An nvcc that does not know our architectures, or is none, is left out before CMake tries it.
   cuda)

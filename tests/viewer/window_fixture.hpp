@@ -4,13 +4,13 @@
 #include <jfpx/error.hpp>
 
 #include "src/viewer/interactive.hpp"
+#include "tests/support/environment.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/viewer/us_keyboard.hpp"
 
 #include <SDL.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 namespace jfpx {
@@ -22,7 +22,6 @@ namespace test {
 class WindowTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    setenv("SDL_VIDEODRIVER", "offscreen", 1);
     try {
       (void)view::Window::hidden();
     } catch (const BackendUnavailable& error) {
@@ -42,6 +41,7 @@ class WindowTest : public ::testing::Test {
   const TemporaryFolder folder;
 
  private:
+  const EnvironmentVariable driver_{"SDL_VIDEODRIVER", "offscreen"};
   std::filesystem::path before_ = std::filesystem::current_path();
 };
 

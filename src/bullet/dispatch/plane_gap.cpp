@@ -4,6 +4,8 @@
 /// A perturbation selects another point of the shape. The bases need not be orthonormal.
 #include "src/bullet/dispatch/plane_gap.hpp"
 
+#include <jfpx/math.hpp>
+
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 
 #include <cmath>
@@ -16,7 +18,7 @@ namespace {
 
 /// Upper bound of the factor by which a matrix scales the length of a vector.
 btScalar norm(const btMatrix3x3& m) {
-  return std::sqrt(m[0].length2() + m[1].length2() + m[2].length2());
+  return square_root(m[0].length2() + m[1].length2() + m[2].length2());
 }
 
 }  // namespace

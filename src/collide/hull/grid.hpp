@@ -2,6 +2,8 @@
 /// coordinates are exact, and products of three neither overflow nor underflow.
 #pragma once
 
+#include <jfpx/math.hpp>
+
 #include "src/collide/hull/exact_sum.hpp"
 
 #include <cmath>
@@ -28,7 +30,7 @@ inline GridPoint operator*(const GridPoint& a, double s) { return {a.x * s, a.y 
 inline double dot(const GridPoint& a, const GridPoint& b) {
   return (a.x * b.x + a.y * b.y) + a.z * b.z;
 }
-inline double length(const GridPoint& a) { return std::sqrt(dot(a, a)); }
+inline double length(const GridPoint& a) { return square_root(dot(a, a)); }
 /// Cross product of differences of points, each component to a few units in the last place.
 inline GridPoint cross(const GridPoint& a, const GridPoint& b) {
   return {product_difference(a.y, b.z, a.z, b.y), product_difference(a.z, b.x, a.x, b.z),

@@ -1,4 +1,6 @@
 /// The kernels without vector instructions: the reference for all other kernels.
+#include <jfpx/math.hpp>
+
 #include "src/sphere_collider/cpu/kernels.inl"
 
 namespace jfpx {
@@ -12,11 +14,7 @@ struct Simd {
   static Vec load(const Real* p) { return *p; }
   static Vec set(Real v) { return v; }
   static void store(Real* p, Vec v) { *p = v; }
-#if defined(JFPX_DOUBLE_PRECISION)
-  static Vec square_root(Vec v) { return __builtin_sqrt(v); }
-#else
-  static Vec square_root(Vec v) { return __builtin_sqrtf(v); }
-#endif
+  static Vec square_root(Vec v) { return jfpx::square_root(v); }
   static std::uint32_t not_greater(Vec a, Vec b) { return a > b ? 0 : 1; }
   static std::uint32_t cells_below(const std::int64_t* cell, std::int64_t bound) {
     return *cell < bound ? 1 : 0;

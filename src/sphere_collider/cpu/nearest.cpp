@@ -84,7 +84,7 @@ NearestPoints find_rows(std::span<const Vec3> points, const std::span<const Vec3
       std::size_t at = row * k;
       for (const cpu::NearestList::Item& item : list.sorted()) {
         found.indices[at] = item.index;
-        found.distances[at] = static_cast<Real>(std::sqrt(item.square));
+        found.distances[at] = static_cast<Real>(square_root(item.square));
         if (cell != nullptr) metric.square(query, points[item.index], &found.shifts[at]);
         ++at;
       }

@@ -1,13 +1,13 @@
 /// Spheres as columns for the kernels, in an order chosen by the caller.
 #pragma once
 
+#include <jfpx/math.hpp>
 #include <jfpx/shape.hpp>
 
 #include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
 #include "src/sphere_collider/cpu/kernels.hpp"
 
-#include <cmath>
 #include <limits>
 #include <span>
 
@@ -19,7 +19,7 @@ namespace cpu {
 /// r*(1 + 15u) + 3t, with u = epsilon/2 and t = the root of the smallest normal number. Uses twice
 /// the least slack, to cover its own rounding.
 inline Real extended_radius(Real r) {
-  static const Real slack = 2 * std::sqrt(std::numeric_limits<Real>::min());
+  static const Real slack = 2 * square_root(std::numeric_limits<Real>::min());
   return r * (1 + 6 * kEpsilon) + slack;
 }
 

@@ -1,10 +1,11 @@
 # Builds and runs the pinned hashes with each compiler, optimisation level and kind of processor, and searches the
 # programs for fused products:
 #   cmake -DBINARY_DIR=... -DCONFIG_DIR=<where jfpx/config.hpp is> [-DLAUNCHER=ccache] [-DTOOLCHAIN=aarch64-linux-gnu]
-#         [-DALL=ON] [-DTHREADS="1;3"] -P run.cmake
-# Without ALL the two ends: not optimised for any processor of the architecture, and most of all for the best that can
-# run. With it, all of them and as many threads as 1 to 8. TOOLCHAIN is the name of a toolchain file in cmake, for another
-# system or processor than this machine's; its programs run in an emulator. What can't run here is said and left out.
+#         [-DALL=ON | -DFLAVOURS="-O0;-O2"] [-DTHREADS="1;3"] -P run.cmake
+# Without ALL and FLAVOURS (compiler options) the two ends: not optimised for any processor of the architecture, and most
+# of all for the best that can run. With ALL, all of them and as many threads as 1 to 8. TOOLCHAIN is the name of a toolchain
+# file in cmake, for another system or processor than this machine's; its programs run in an emulator. What can't run here
+# is said and left out.
 cmake_host_system_information(RESULT host QUERY OS_PLATFORM)
 set(processor ${host})
 set(toolchain "")
@@ -58,6 +59,8 @@ if(ALL)
       list(APPEND flavours "${level}${kind}")
     endforeach()
   endforeach()
+elseif(FLAVOURS)
+  set(flavours ${FLAVOURS})
 else()
   set(best "")
   foreach(kind IN LISTS kinds)
