@@ -6,6 +6,7 @@
 #include <jfpx/config.hpp>
 
 #include <cmath>
+#include <concepts>
 #include <limits>
 #include <optional>
 #if defined(__MINGW32__) && defined(__x86_64__)
@@ -40,6 +41,10 @@ JFPX_HD inline double square_root(double x) {
 #else
   return std::sqrt(x);
 #endif
+}
+template <std::integral Integer>
+JFPX_HD inline Real square_root(Integer x) {
+  return square_root(static_cast<Real>(x));
 }
 JFPX_HD inline Real absolute(Real x) {
 #if defined(__CUDA_ARCH__)

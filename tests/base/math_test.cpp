@@ -12,6 +12,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <type_traits>
 
 namespace jfpx {
 namespace {
@@ -44,6 +45,11 @@ TEST(SquareRoot, IsCorrectlyRounded) {
     const auto narrow = static_cast<float>(digits);
     ASSERT_EQ(square_root(narrow), static_cast<float>(square_root(static_cast<double>(narrow))));
   }
+}
+
+TEST(SquareRoot, OfAnIntegerIsAReal) {
+  static_assert(std::is_same_v<decltype(square_root(2)), Real>);
+  EXPECT_EQ(square_root(2), square_root(Real(2)));
 }
 
 TEST(Vec3, CrossProductOfTheAxesIsRightHanded) {

@@ -133,7 +133,13 @@ void meddle_near(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
                        static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject)};
   log_event("near " + name_of(busy[0]) + " " + name_of(busy[1]));
   meddle(busy);
-  if (g_current->log.size() % 17 != 0) {
+  const std::size_t number = g_current->log.size();
+  if (number % 17 == 0) return;
+  if (number % 23 == 0) {
+    btDispatcherInfo continuous = info;
+    continuous.m_dispatchFunc = btDispatcherInfo::DISPATCH_CONTINUOUS;
+    g_default_near_callback(pair, dispatcher, continuous);
+  } else {
     g_default_near_callback(pair, dispatcher, info);
   }
 }

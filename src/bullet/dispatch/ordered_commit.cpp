@@ -16,6 +16,7 @@ namespace bullet {
 
 thread_local OrderedCommit::Walk* OrderedCommit::running_ = nullptr;
 thread_local std::uint64_t OrderedCommit::default_calls_ = 0;
+thread_local std::uint64_t OrderedCommit::stock_dispatches_ = 0;
 
 class OrderedCommit::Walk final : public btOverlapCallback {
  public:
@@ -56,9 +57,10 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   const CommitCounts& counts() const { return counts_; }
 
   /// Processes the pair for a near callback. Returns false if Bullet must process it.
-  bool process_default(btBroadphasePair& pair, const btCollisionDispatcher& dispatcher) {
+  bool process_default(btBroadphasePair& pair, const btCollisionDispatcher& dispatcher,
+                       const btDispatcherInfo& info) {
     const std::size_t i = index_of(pair);
-    if (&dispatcher != &dispatcher_ || !has_current_entry(pair, i)) return false;
+    if (&dispatcher != &dispatcher_ || &info != &info_ || !has_current_entry(pair, i)) return false;
     note_changes(i, pair);  // by the near callback
     if (is_changed_ || (actions_[i] == Action::stock && convex_ == nullptr)) return false;
     visit_default(i, pair);
@@ -111,7 +113,8 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   /// not read.
   void note_changes(std::size_t i, const btBroadphasePair& pair) {
     // Bullet may have created the algorithm of the pair.
-    is_changed_ = static_cast<std::size_t>(cache_.getNumOverlappingPairs()) != pairs_.size() ||
+    is_changed_ = is_changed_ ||
+                  static_cast<std::size_t>(cache_.getNumOverlappingPairs()) != pairs_.size() ||
                   !batch_.is_entry_of_proxies(pair, i);
   }
 
@@ -120,10 +123,14 @@ class OrderedCommit::Walk final : public btOverlapCallback {
             reinterpret_cast<std::uintptr_t>(pairs_.data())) /
            sizeof(btBroadphasePair);
   }
-  /// False if a callback has added, removed or moved the pair, or has replaced its algorithm.
+  /// False if a callback has added, removed or moved the pair, has replaced its algorithm or
+  /// changed the kind of the dispatch, or has run another dispatch: algorithms and manifolds may
+  /// then be others at the same addresses.
   bool has_current_entry(const btBroadphasePair& pair, std::size_t i) const {
-    return !is_changed_ && i < pairs_.size() && batch_.is_entry_of(pair, i);
+    return !is_changed_ && is_discrete() && stock_dispatches_ == stock_before_ &&
+           i < pairs_.size() && batch_.is_entry_of(pair, i);
   }
+  bool is_discrete() const { return info_.m_dispatchFunc == btDispatcherInfo::DISPATCH_DISCRETE; }
 
   void visit_stock(btBroadphasePair& pair) const {
     (*dispatcher_.getNearCallback())(pair, dispatcher_, info_);
@@ -137,7 +144,12 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     }
     if (pair.m_algorithm == nullptr) return;
     btManifoldResult result(&wrapper_a, &wrapper_b);
-    pair.m_algorithm->processCollision(&wrapper_a, &wrapper_b, info_, &result);
+    if (is_discrete()) {
+      pair.m_algorithm->processCollision(&wrapper_a, &wrapper_b, info_, &result);
+      return;
+    }
+    info_.m_timeOfImpact = std::min(
+        info_.m_timeOfImpact, pair.m_algorithm->calculateTimeOfImpact(&a, &b, info_, &result));
   }
 
   /// Returns false if user code may have prevented or changed the update of a pair of spheres.
@@ -158,13 +170,13 @@ class OrderedCommit::Walk final : public btOverlapCallback {
     auto& b = *static_cast<btCollisionObject*>(pair.m_pProxy1->m_clientObject);
     if (!dispatcher_.needsCollision(&a, &b)) return action != Action::commit;
     note_changes(i, pair);
-    if (is_changed_ || !batch_.is_entry_of(pair, i)) {
+    if (!has_current_entry(pair, i)) {
       run_algorithm(pair, a, b);
       return false;
     }
     switch (action) {
       case Action::stock:
-        if (!commit_other(i, a, b)) run_algorithm(pair, a, b);
+        if (!commit_other(i, pair, a, b)) run_algorithm(pair, a, b);
         return true;
       case Action::skip:
       case Action::filter:
@@ -191,7 +203,9 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   }
 
   /// Updates a pair that is not two spheres. Returns false if Bullet's algorithm must run.
-  bool commit_other(std::size_t i, const btCollisionObject& a, const btCollisionObject& b) {
+  bool commit_other(std::size_t i, const btBroadphasePair& pair, const btCollisionObject& a,
+                    const btCollisionObject& b) {
+    if (pair.m_algorithm == nullptr) return false;  // the batch may have other bodies
     if (!is_observed(a, b)) return commit_unobserved(*convex_, i, &counts_);
     if (!has_sphere(batch_, i)) return false;
     commit_in_order(*convex_, i, &counts_);
@@ -255,6 +269,7 @@ class OrderedCommit::Walk final : public btOverlapCallback {
   const Visited& visited_;
   CommitCounts counts_;
   bool is_changed_ = false;  ///< Bullet processes all remaining pairs
+  std::uint64_t stock_before_ = stock_dispatches_;
 };
 
 CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairContact> touching,
@@ -288,7 +303,7 @@ CommitCounts OrderedCommit::plan(const SphereBatch& batch, std::span<const PairC
 void OrderedCommit::process_default(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
                                     const btDispatcherInfo& info) {
   ++default_calls_;
-  if (running_ != nullptr && running_->process_default(pair, dispatcher)) return;
+  if (running_ != nullptr && running_->process_default(pair, dispatcher, info)) return;
   btCollisionDispatcher::defaultNearCallback(pair, dispatcher, info);
 }
 

@@ -44,7 +44,10 @@ class OrderedCommit {
   /// The number of calls of process_default() on the calling thread.
   static std::uint64_t default_calls() { return default_calls_; }
   /// Before Bullet runs a dispatch on this thread: run() may have been left by longjmp().
-  static void forget_running() { running_ = nullptr; }
+  static void forget_running() {
+    running_ = nullptr;
+    ++stock_dispatches_;
+  }
 
  private:
   enum class Action : std::uint8_t {
@@ -58,6 +61,7 @@ class OrderedCommit {
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   static thread_local Walk* running_;
   static thread_local std::uint64_t default_calls_;
+  static thread_local std::uint64_t stock_dispatches_;  ///< of dispatchers of jfpx, by Bullet
 
   std::vector<Action> actions_;
   std::vector<std::uint32_t> contacts_;  ///< by pair: the index of its contact, or kNone

@@ -39,8 +39,9 @@ bool is_one_of(const btCollisionShape& shape) {
   return (is_exactly<Exact>(shape) || ...);
 }
 
-bool is_wrapped_sphere(const btCollisionShape& shape) {
-  if (shape.getShapeType() != COMPOUND_SHAPE_PROXYTYPE) return false;
+/// @param traits of the body, whose shape Bullet reads only if it is active
+bool is_wrapped_sphere(const btCollisionShape& shape, unsigned traits) {
+  if ((traits & kActive) == 0 || !is_exactly<btCompoundShape>(shape)) return false;
   const auto& compound = static_cast<const btCompoundShape&>(shape);
   return compound.getNumChildShapes() > 0 &&
          compound.getChildShape(0)->getShapeType() == SPHERE_SHAPE_PROXYTYPE;
@@ -142,7 +143,8 @@ SphereBatch::Summary SphereBatch::read_bodies(std::size_t begin, std::size_t end
     summary.traits |= traits_[k];
     summary.collision_flags |= bodies_[k]->getCollisionFlags();
     summary.spheres += (traits_[k] & kSphere) != 0 ? 1 : 0;
-    summary.wrapped_spheres += is_wrapped_sphere(*bodies_[k]->getCollisionShape()) ? 1 : 0;
+    summary.wrapped_spheres +=
+        is_wrapped_sphere(*bodies_[k]->getCollisionShape(), traits_[k]) ? 1 : 0;
   }
   return summary;
 }
