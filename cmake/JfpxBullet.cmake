@@ -29,6 +29,11 @@ if(NOT CMAKE_CROSSCOMPILING OR CMAKE_CROSSCOMPILING_EMULATOR)
     jfpx_without(bullet "Bullet's library has fused multiply-add, whose bits jfpx does not have: it must be compiled with -ffp-contract=off")
   endif()
 endif()
+# Where a library does not see the symbols of the program, it would have Bullet's callbacks and counters of its own.
+if(WIN32 AND BUILD_SHARED_LIBS AND NOT "${JFPX_BULLET_F32_LINK_LIBRARIES};${JFPX_BULLET_F64_LINK_LIBRARIES}" MATCHES "[.]dll[.]a")
+  set(JFPX_HAS_BULLET OFF)
+  jfpx_without(bullet "BUILD_SHARED_LIBS is ON and Bullet's libraries are static, so that each DLL would have a Bullet of its own")
+endif()
 
 # Targets of a precision that is not built are defined, but need no Bullet.
 foreach(precision IN ITEMS F32 F64)
