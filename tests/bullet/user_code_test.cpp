@@ -135,7 +135,10 @@ void meddle_near(btBroadphasePair& pair, btCollisionDispatcher& dispatcher,
   meddle(busy);
   const std::size_t number = g_current->log.size();
   if (number % 17 == 0) return;
-  if (number % 23 == 0) {
+  // Bullet's algorithm of compounds reads children without an algorithm in a continuous dispatch.
+  const bool any_compound = std::ranges::any_of(
+      busy, [](const auto* body) { return body->getCollisionShape()->isCompound(); });
+  if (number % 23 == 0 && !any_compound) {
     btDispatcherInfo continuous = info;
     continuous.m_dispatchFunc = btDispatcherInfo::DISPATCH_CONTINUOUS;
     g_default_near_callback(pair, dispatcher, continuous);
