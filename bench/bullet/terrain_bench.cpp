@@ -13,7 +13,6 @@
 #include <btBulletDynamicsCommon.h>
 
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -133,39 +132,12 @@ class TerrainWorld {
   std::unique_ptr<btDiscreteDynamicsWorld> world_;
 };
 
-double clock_ms(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
-
 /// Without profile zones: Bullet enters two for each triangle, so that measuring them would add
 /// more to its time than to that of jfpx.
 void step_on_terrain(benchmark::State& state, Terrain terrain, bool boxes) {
   TerrainWorld stock(terrain, boxes, 0);
   TerrainWorld ours(terrain, boxes, static_cast<unsigned>(state.range(0)));
-  const clockid_t clock = state.range(0) == 1 ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC;
-  const auto time_step = [&](TerrainWorld& world) {
-    const double start = clock_ms(clock);
-    world.step();
-    return clock_ms(clock) - start;
-  };
-  std::vector<double> stock_ms, our_ms, ratios;
-  bool swap = false;
-  for (auto _ : state) {
-    double stock_step = 0, our_step = 0;
-    alternate(
-        swap, [&] { stock_step = time_step(stock); }, [&] { our_step = time_step(ours); });
-    swap = !swap;
-    stock_ms.push_back(stock_step);
-    our_ms.push_back(our_step);
-    ratios.push_back(our_step / stock_step);
-    state.SetIterationTime(our_step * 1e-3);
-  }
-  if (first_difference(stock.world(), ours.world(), 0)) state.SkipWithError("the worlds differ");
-  state.counters["stock_ms"] = median(stock_ms);
-  state.counters["jfpx_ms"] = median(our_ms);
-  state.counters["ratio"] = median(ratios);
+  compare_steps(state, &stock, &ours);
 }
 
 void register_all() {

@@ -12,25 +12,6 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-TwinOptions compound_options(unsigned threads, bool verify = false) {
-  TwinOptions options;
-  options.ours = [=](btCollisionConfiguration* c) {
-    return std::make_unique<CollisionDispatcher>(
-        c, DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = threads},
-                             .minimum_batch = 0,
-                             .verify = verify});
-  };
-  return options;
-}
-
-btTransform random_child_pose(Random& random, Real extent) {
-  const Vec3 p = random.uniform_in_box({-extent, -extent, -extent}, {extent, extent, extent});
-  const Vec3 v = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
-  const btQuaternion q(v.x, v.y, v.z, random.uniform(Real(-1), Real(1)));
-  return btTransform(q.length2() > Real(0.01) ? q.normalized() : btQuaternion::getIdentity(),
-                     btVector3(p.x, p.y, p.z));
-}
-
 btCollisionShape* random_child(Random& random) {
   const auto length = [&] { return random.uniform(Real(0.2), Real(0.6)); };
   switch (random.below(8)) {
@@ -54,7 +35,7 @@ btCompoundShape* random_compound(BulletWorld& w, Random& random) {
   const std::uint64_t children = random.below(3) == 0 ? 1 + random.below(3) : 1;
   for (std::uint64_t k = 0; k < children; ++k) {
     const btTransform at =
-        random.below(3) == 0 ? btTransform::getIdentity() : random_child_pose(random, Real(0.4));
+        random.below(3) == 0 ? btTransform::getIdentity() : random_turned_pose(random, Real(0.4));
     compound->addChildShape(at, w.keep(random_child(random)));
   }
   return compound;
@@ -64,7 +45,7 @@ btCompoundShape* random_compound(BulletWorld& w, Random& random) {
 class Compounds {
  public:
   Compounds(std::uint64_t seed, unsigned threads, bool verify = false)
-      : twins(compound_options(threads, verify)) {
+      : twins(batch_options(threads, verify)) {
     const bool deterministic = seed % 4 == 0;
     twins.both([&](BulletWorld& w) {
       w.world.getDispatchInfo().m_deterministicOverlappingPairs = deterministic;
@@ -95,7 +76,7 @@ class Compounds {
     twins.both([&](BulletWorld& w) {
       Random same(seed);
       for (std::size_t i = 2; i < w.bodies.size(); ++i) {
-        const btTransform turn = random_child_pose(same, extent);
+        const btTransform turn = random_turned_pose(same, extent);
         btTransform& pose = w.bodies[i]->getWorldTransform();
         pose.setOrigin(extent > 1 ? turn.getOrigin() : pose.getOrigin() + turn.getOrigin());
         if (extent > 1) pose.setBasis(turn.getBasis());
@@ -116,7 +97,7 @@ class Compounds {
     const int last = compound.getNumChildShapes() - 1;
     switch (random.below(4)) {
       case 0:
-        compound.addChildShape(random_child_pose(random, Real(0.4)), w.keep(random_child(random)));
+        compound.addChildShape(random_turned_pose(random, Real(0.4)), w.keep(random_child(random)));
         return;
       case 1:
         // Bullet reads the removed child of a pair that is not cleaned.
@@ -125,10 +106,10 @@ class Compounds {
         if (last > 0) compound.removeChildShapeByIndex(last);
         return;
       case 2:
-        if (last >= 0) compound.updateChildTransform(last, random_child_pose(random, Real(0.4)));
+        if (last >= 0) compound.updateChildTransform(last, random_turned_pose(random, Real(0.4)));
         return;
       default:
-        if (last >= 0) compound.getChildTransform(last) = random_child_pose(random, Real(0.4));
+        if (last >= 0) compound.getChildTransform(last) = random_turned_pose(random, Real(0.4));
     }
   }
 };
@@ -177,7 +158,7 @@ void add_wrapped_heap(BulletWorld& w, btCollisionShape* sphere) {
 
 TEST(CompoundCommit, UpdatesSpheresInCompoundsOfOneChild) {
   for (const unsigned threads : {1u, 3u}) {
-    Twins twins(compound_options(threads));
+    Twins twins(batch_options(threads));
     twins.both(
         [](BulletWorld& w) { add_wrapped_heap(w, w.keep(new btSphereShape(btScalar(0.4)))); });
     ASSERT_TRUE(twins.step(90));
@@ -198,7 +179,7 @@ class CountingSphere final : public btSphereShape {
 };
 
 TEST(CompoundCommit, LeavesChildrenOfUserClassesToBullet) {
-  Twins twins(compound_options(3));
+  Twins twins(batch_options(3));
   std::uint64_t calls[2] = {};
   twins.both(
       [](BulletWorld& w) { add_wrapped_heap(w, w.keep(new CountingSphere(btScalar(0.4)))); });
@@ -221,7 +202,7 @@ bool log_children(const btCollisionShape* a, const btCollisionShape* b) {
 }
 
 TEST(CompoundCommit, LeavesPairsToBulletWhereTheUserFiltersChildren) {
-  Twins twins(compound_options(3));
+  Twins twins(batch_options(3));
   gCompoundCompoundChildShapePairCallback = log_children;
   gCompoundChildShapePairCallback = log_children;
   twins.both([](BulletWorld& w) { add_wrapped_heap(w, w.keep(new btSphereShape(btScalar(0.4)))); });

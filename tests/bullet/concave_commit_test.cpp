@@ -13,25 +13,6 @@ inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
 
-TwinOptions concave_options(unsigned threads, bool verify = false) {
-  TwinOptions options;
-  options.ours = [=](btCollisionConfiguration* c) {
-    return std::make_unique<CollisionDispatcher>(
-        c, DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = threads},
-                             .minimum_batch = 0,
-                             .verify = verify});
-  };
-  return options;
-}
-
-btTransform random_turn(Random& random, Real extent) {
-  const Vec3 p = random.uniform_in_box({-extent, -extent, -extent}, {extent, extent, extent});
-  const Vec3 v = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
-  const btQuaternion q(v.x, v.y, v.z, random.uniform(Real(-1), Real(1)));
-  return btTransform(q.length2() > Real(0.01) ? q.normalized() : btQuaternion::getIdentity(),
-                     btVector3(p.x, p.y, p.z));
-}
-
 /// The same terrain in two worlds, and bodies near its surface.
 class Landscape {
  public:
@@ -42,11 +23,11 @@ class Landscape {
     bool only_round = false;
   };
   Landscape(std::uint64_t seed, const Options& options)
-      : twins(concave_options(options.threads, options.verify)),
+      : twins(batch_options(options.threads, options.verify)),
         terrains_{RandomTerrain(seed), RandomTerrain(seed)} {
     Random random(seed + 1);
     const bool terrain_first = random.below(2) == 0;
-    turn_ = random.below(2) == 0 ? random_turn(random, 2) : btTransform::getIdentity();
+    turn_ = random.below(2) == 0 ? random_turned_pose(random, 2) : btTransform::getIdentity();
     const std::uint64_t bodies_seed = random.below(1u << 30);
     const bool separating_axes = random.below(4) == 0;
     twins.both([&](BulletWorld& w) {
@@ -81,7 +62,7 @@ class Landscape {
       Random same(seed);
       for (auto& body : w.bodies) {
         if (body.get() == terrain_of(w)) continue;
-        const btTransform turn = random_turn(same, extent);
+        const btTransform turn = random_turned_pose(same, extent);
         if (extent > 1) {
           const Vec3 p = same.uniform_in_box({-6, Real(-1.2), -6}, {6, Real(1.5), 6});
           body->setWorldTransform(turn_ *
@@ -95,7 +76,7 @@ class Landscape {
     });
   }
   void move_terrain(Random& random) {
-    const btTransform shift = random_turn(random, Real(0.05));
+    const btTransform shift = random_turned_pose(random, Real(0.05));
     twins.both([&](BulletWorld& w) {
       terrain_of(w)->getWorldTransform().setOrigin(terrain_of(w)->getWorldTransform().getOrigin() +
                                                    shift.getOrigin());
@@ -288,7 +269,7 @@ std::uint64_t count_of(Twins& twins, ConcaveFallback fallback) {
 TEST(ConcaveCommit, LeavesArraysOfTheUserToBullet) {
   Table table;
   LockedArrays stock, ours;
-  Twins twins(concave_options(3));
+  Twins twins(batch_options(3));
   twins.both([&](BulletWorld& w) { table.fill(w, &w == &twins.ours() ? &ours : &stock); });
   ASSERT_TRUE(twins.step(10));
   EXPECT_EQ(ours.locks(), stock.locks());
@@ -301,7 +282,7 @@ TEST(ConcaveCommit, LeavesAlgorithmsOfTheUserToBullet) {
   btTriangleIndexVertexArray stock, ours;
   btMinkowskiPenetrationDepthSolver depth_solver;
   btConvexConvexAlgorithm::CreateFunc boxes(&depth_solver), spheres(&depth_solver);
-  Twins twins(concave_options(3));
+  Twins twins(batch_options(3));
   twins.both([&](BulletWorld& w) {
     table.fill(w, &w == &twins.ours() ? &ours : &stock);
     w.dispatcher->registerCollisionCreateFunc(BOX_SHAPE_PROXYTYPE, TRIANGLE_SHAPE_PROXYTYPE,
@@ -317,7 +298,7 @@ TEST(ConcaveCommit, LeavesAlgorithmsOfTheUserToBullet) {
 TEST(ConcaveCommit, ReadsShapesThatTheUserReplaces) {
   Table table;
   btTriangleIndexVertexArray stock, ours;
-  Twins twins(concave_options(3));
+  Twins twins(batch_options(3));
   twins.both([&](BulletWorld& w) { table.fill(w, &w == &twins.ours() ? &ours : &stock); });
   ASSERT_TRUE(twins.step(3));
   // Without cleaning the pairs, so that the algorithms remain.
@@ -343,7 +324,7 @@ TEST(ConcaveCommit, ReadsShapesThatTheUserReplaces) {
 TEST(ConcaveCommit, RunsBatchesWithoutSpheresOnOneThread) {
   RandomTerrain stock(8), ours(8);
   for (const int boxes : {20, 100}) {
-    Twins twins(concave_options(1));
+    Twins twins(batch_options(1));
     twins.both([&](BulletWorld& w) {
       w.add((&w == &twins.ours() ? ours : stock).shape(), btVector3(0, 0, 0), 0);
       auto* box = w.keep(new btBoxShape(btVector3(btScalar(0.2), btScalar(0.3), btScalar(0.2))));

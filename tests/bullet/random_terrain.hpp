@@ -14,6 +14,27 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
+/// Worlds whose own dispatcher updates every pair in batches, on a number of threads.
+inline TwinOptions batch_options(unsigned threads, bool verify = false) {
+  TwinOptions options;
+  options.ours = [=](btCollisionConfiguration* c) {
+    return std::make_unique<CollisionDispatcher>(
+        c, DispatcherOptions{.collider = {.backend = Backend::cpu, .threads = threads},
+                             .minimum_batch = 0,
+                             .verify = verify});
+  };
+  return options;
+}
+
+/// @param extent [m], largest magnitude of a coordinate
+inline btTransform random_turned_pose(Random& random, Real extent) {
+  const Vec3 p = random.uniform_in_box({-extent, -extent, -extent}, {extent, extent, extent});
+  const Vec3 v = random.uniform_in_box({-1, -1, -1}, {1, 1, 1});
+  const btQuaternion q(v.x, v.y, v.z, random.uniform(Real(-1), Real(1)));
+  return btTransform(q.length2() > Real(0.01) ? q.normalized() : btQuaternion::getIdentity(),
+                     btVector3(p.x, p.y, p.z));
+}
+
 /// Hills of `kPoints` x `kPoints` points with distance 1 around the origin, as a mesh or a height
 /// field. Equal seeds give equal terrains, each with its own arrays.
 class RandomTerrain {
