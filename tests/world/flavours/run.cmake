@@ -3,7 +3,8 @@
 #   cmake -DBINARY_DIR=... -DCONFIG_DIR=<where jfpx/config.hpp is> [-DLAUNCHER=ccache] [-DTOOLCHAIN=aarch64-linux-gnu]
 #         [-DALL=ON | -DFLAVOURS="-O0;-O2"] [-DTHREADS="1;3"] -P run.cmake
 # Without ALL and FLAVOURS (compiler options) the two ends: not optimised for any processor of the architecture, and most
-# of all for the best that can run. With ALL, all of them and as many threads as 1 to 8. TOOLCHAIN is the name of a toolchain
+# of all for the best that can run; each in one precision, which alternates so that either precision meets both compilers
+# and both ends. With ALL, all of them, both precisions, and as many threads as 1 to 8. TOOLCHAIN is the name of a toolchain
 # file in cmake, for another system or processor than this machine's; its programs run in an emulator. What can't run here
 # is said and left out.
 cmake_host_system_information(RESULT host QUERY OS_PLATFORM)
@@ -67,6 +68,7 @@ else()
     set(best "${kind}")
   endforeach()
   set(flavours "-O0" "-O3${best}")
+  set(turns float double double float) # a compiler and flavour each
 endif()
 if(NOT THREADS)
   set(THREADS 1)
@@ -86,6 +88,10 @@ foreach(compiler IN LISTS compilers)
     continue()
   endif()
   foreach(flavour IN LISTS flavours)
+    set(precisions float double)
+    if(turns)
+      list(POP_FRONT turns precisions)
+    endif()
     string(REPLACE " -march=" "-" folder "${flavour}")
     set(build ${BINARY_DIR}/${compiler}${folder})
     if(toolchain)
@@ -96,6 +102,7 @@ foreach(compiler IN LISTS compilers)
         -DCMAKE_TOOLCHAIN_FILE=${toolchain}
         -DCMAKE_CXX_COMPILER=${path_of_${compiler}} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER}
         -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS=${flavour} -DCONFIG_DIR=${CONFIG_DIR} "-DTHREADS=${THREADS}"
+        "-DPRECISIONS=${precisions}"
         -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16
       OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
     execute_process(COMMAND ${CMAKE_COMMAND} --build ${build} --parallel ${processors}
@@ -103,7 +110,11 @@ foreach(compiler IN LISTS compilers)
     if(NOT result EQUAL 0)
       message(FATAL_ERROR "${compiler} ${flavour} does not build:\n${output}")
     endif()
-    foreach(suffix IN ITEMS "" "_f64")
+    foreach(precision IN LISTS precisions)
+      set(suffix "")
+      if(precision STREQUAL "double")
+        set(suffix "_f64")
+      endif()
       set(program ${build}/pinned_hashes${suffix})
       file(READ ${program}.out output)
       file(STRINGS ${program}.status result)
