@@ -336,8 +336,7 @@ TEST_F(Preload, TakesLittleMoreStackThanBullet) {
   for (const std::string threads : {"1", "2"}) {
     const std::string command = "preload --minimum-batch 0 --threads " + threads;
     const ProcessResult ours = jfpx_command(command + " -- " + program);
-    // 4 KiB, and some more in builds that are not fully optimized.
-    EXPECT_LE(bytes_of(ours), bytes_of(stock) + 4096 + 512) << threads << " threads";
+    EXPECT_LE(bytes_of(ours), bytes_of(stock) + 4096) << threads << " threads";
     EXPECT_THAT(jfpx_command(command + " --summary -- " + program + " 2>&1").output,
                 HasSubstr("solver: "))
         << "jfpx has computed";

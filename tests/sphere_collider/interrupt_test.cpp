@@ -56,7 +56,9 @@ void interrupt_everywhere(const char* name, unsigned threads,
     polls_left = polls;
     try {
       EXPECT_EQ(search(), expected);
-      EXPECT_GT(polls, threads == 1 ? 1 : -1);
+      if (threads == 1) {
+        EXPECT_GT(polls, 1);
+      }
       return;
     } catch (const Stop&) {
       polls_left = -1;  // the next search is not interrupted

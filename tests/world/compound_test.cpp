@@ -148,7 +148,8 @@ TEST(Compound, AllContactsAreFoundInOrder) {
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
   std::size_t spheres = 0, others = 0;
-  for (int n = 0; n < 300; ++n) {
+  // Some random bodies have few contacts of two spheres.
+  for (int n = 0; n < 300 || (spheres <= 100 && n < 3000); ++n) {
     BodyStore bodies(0.01_r, SleepSettings{});
     for (std::uint64_t left = 2 + random.below(40); left > 0; --left) {
       bodies.add(test::random_body(&random, 2.5_r));
@@ -159,7 +160,7 @@ TEST(Compound, AllContactsAreFoundInOrder) {
     spheres += sphere_contacts;
     others += found.size() - sphere_contacts;
   }
-  EXPECT_GT(spheres, 30u);
+  EXPECT_GT(spheres, 100u);
   EXPECT_GT(others, 1000u);
 }
 
