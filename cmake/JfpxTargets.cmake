@@ -3,6 +3,11 @@ find_package(Threads REQUIRED)
 include(GNUInstallDirs)
 include(JfpxExact)
 
+# Windows looks for DLLs in the folder of the program.
+if(WIN32 AND BUILD_SHARED_LIBS AND NOT CMAKE_RUNTIME_OUTPUT_DIRECTORY)
+  set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+endif()
+
 configure_file(${PROJECT_SOURCE_DIR}/include/jfpx/config.hpp.in
                ${PROJECT_BINARY_DIR}/include/jfpx/config.hpp @ONLY)
 

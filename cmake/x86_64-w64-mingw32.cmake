@@ -13,7 +13,16 @@ endif()
 set(CMAKE_RC_COMPILER x86_64-w64-mingw32-windres)
 find_program(JFPX_WINE NAMES wine64 wine PATHS /usr/lib/wine)
 set(CMAKE_CROSSCOMPILING_EMULATOR ${CMAKE_COMMAND} -E env WINEDEBUG=-all ${JFPX_WINE})
-if(NOT BUILD_SHARED_LIBS)
+if(BUILD_SHARED_LIBS) # DLLs of the compiler
+  set(folders "")
+  foreach(library IN ITEMS libstdc++-6.dll libwinpthread-1.dll)
+    execute_process(COMMAND ${CMAKE_CXX_COMPILER} -print-file-name=${library}
+      OUTPUT_VARIABLE file OUTPUT_STRIP_TRAILING_WHITESPACE)
+    cmake_path(GET file PARENT_PATH folder)
+    string(APPEND folders "Z:${folder}\;")
+  endforeach()
+  list(INSERT CMAKE_CROSSCOMPILING_EMULATOR 3 "WINEPATH=${folders}")
+else()
   set(CMAKE_EXE_LINKER_FLAGS_INIT -static)
 endif()
 
