@@ -2,7 +2,7 @@
 Markdown. What is not installed is left out. All libraries search the same points, and must find the same
 number of pairs.
 
-    python bench/python/neighbours.py [cpu] [cuda] [stages] [world] [world-cuda]
+    python bench/python/neighbours.py [cpu] [cells] [batches] [cuda] [stages] [world] [world-cuda]
 
 `cuda` compares with Warp, with PyTorch Geometric if --geometric is given, and with brute force, all on
 the device. `stages` divides the time of a call on the device.
@@ -71,6 +71,94 @@ def cpu():
             len(cKDTree(x).query_pairs(cutoff, output_type="ndarray")), own, other, other / own)
     x, cutoff = points_of(10, 3)
     print(f"\n10 points: {1e3 * median_ms(lambda: jfpx.find_pairs(x, cutoff), repeats=2000):.1f} us")
+
+
+def lists_of(positions, cutoff, cell):
+    """Functions that find half lists (matscipy: full ones) with shifts, by library."""
+    lists = {"jfpx": lambda: jfpx.find_neighbors(positions, cutoff, cell=cell).pairs.shape[1]}
+    try:
+        import vesin
+        calculator = vesin.NeighborList(cutoff=cutoff, full_list=False)
+        lists["vesin"] = lambda: len(calculator.compute(positions, cell, True, "ijS")[0])
+    except ImportError:
+        pass
+    try:
+        from matscipy.neighbours import neighbour_list
+        lists["matscipy"] = lambda: len(neighbour_list("ijS", cutoff=cutoff, positions=positions, cell=cell,
+                                                       pbc=[True] * 3)[0]) // 2
+    except ImportError:
+        pass
+    if np.array_equal(cell, np.eye(3)):
+        lists["find_pairs"] = lambda: jfpx.find_pairs(positions, cutoff, periodic=(1, 1, 1))[0].shape[1]
+        try:
+            from scipy.spatial import cKDTree
+            lists["SciPy"] = lambda: len(cKDTree(positions, boxsize=1).query_pairs(cutoff, output_type="ndarray"))
+        except ImportError:
+            pass
+    return lists
+
+
+def cells():
+    """All libraries take turns, so that other load of the machine has the same effect on each."""
+    libraries = ("jfpx", "find_pairs", "vesin", "matscipy", "SciPy")
+    print("\n## Periodic cells, float64, one thread, ms\n\nMedians; the libraries take turns. `find_pairs` is that of "
+          "jfpx. matscipy lists both orders, SciPy has no shifts.\n\n"
+          "| cell | points | neighbours | pairs | " + " | ".join(libraries) + " | fastest other / jfpx |\n"
+          + "|---" * (5 + len(libraries)) + "|", flush=True)
+    for name, cell in (("cube", np.eye(3)), ("triclinic", np.array([[1, 0, 0], [0.4, 1, 0], [-0.3, 0.45, 1]]))):
+        for n in (10_000, 100_000):
+            positions = np.random.default_rng(1).random((n, 3)) @ cell
+            for neighbours in (3, 30, 100):
+                cutoff = (3 * neighbours / (4 * np.pi * n)) ** (1 / 3)
+                lists = lists_of(positions, cutoff, cell)
+                if n * neighbours > 2_000_000:
+                    lists.pop("matscipy", None)  # takes minutes
+                times, pairs = {library: [] for library in lists}, {}
+                for _ in range(5 if n * neighbours <= 300_000 else 3):
+                    for library, search in lists.items():
+                        begin = time.perf_counter()
+                        pairs[library] = search()
+                        times[library].append(1e3 * (time.perf_counter() - begin))
+                assert len(set(pairs.values())) == 1, pairs
+                medians = {library: statistics.median(values) for library, values in times.items()}
+                others = [medians[library] for library in ("vesin", "matscipy", "SciPy") if library in medians]
+                row(name, n, neighbours, pairs["jfpx"], *(medians.get(library, "-") for library in libraries),
+                    min(others) / medians["jfpx"] if others else "-")
+
+
+def batches():
+    """Many small systems, each with a cell of its own, in one call and in a loop that joins the results."""
+    systems, points = 5000, 20
+    rng = np.random.default_rng(1)
+    cells = 5 * (np.eye(3) + rng.uniform(-0.2, 0.2, (systems, 3, 3)))
+    x = (rng.random((systems, points, 3)) @ cells).reshape(-1, 3)
+    numbers = np.repeat(np.arange(systems), points)
+
+    def loop(cutoff, cells, half):
+        parts = []
+        for k in range(systems):
+            found = jfpx.find_neighbors(x[k * points:(k + 1) * points], cutoff,
+                                        cell=None if cells is None else cells[k], half=half)
+            parts.append((found.pairs + k * points, found.shifts))
+        return np.concatenate([pairs for pairs, _ in parts], axis=1), np.concatenate([shifts for _, shifts in parts])
+
+    print(f"\n## {systems} systems of {points} points, float64, one thread, ms\n\nMedians; both take turns. Triclinic "
+          "cells of about 5 x 5 x 5.\n\n| cells | lists | cutoff | pairs | loop | batch | ratio |\n|---|---|---|---|---|---|---|",
+          flush=True)
+    for name, own_cells in (("none", None), ("own", cells)):
+        for cutoff in (1.5, 2, 3):
+            for half in (True, False):
+                times = [], []
+                for _ in range(5):
+                    begin = time.perf_counter()
+                    expected = loop(cutoff, own_cells, half)
+                    middle = time.perf_counter()
+                    found = jfpx.find_neighbors(x, cutoff, cell=own_cells, batch=numbers, half=half)
+                    times[1].append(1e3 * (time.perf_counter() - middle))
+                    times[0].append(1e3 * (middle - begin))
+                    assert np.array_equal(found.pairs, expected[0]) and np.array_equal(found.shifts, expected[1])
+                own, other = statistics.median(times[1]), statistics.median(times[0])
+                row(name, "half" if half else "full", cutoff, found.pairs.shape[1], other, own, other / own)
 
 
 def warp_search(x, cutoff, lists):
@@ -314,7 +402,7 @@ def world(backend="cpu"):
 
 
 def main():
-    parts = {"cpu": cpu, "cuda": None, "stages": stages, "world": world,
+    parts = {"cpu": cpu, "cells": cells, "batches": batches, "cuda": None, "stages": stages, "world": world,
              "world-cuda": lambda: world("cuda")}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*parts, []], default=[], metavar="part")

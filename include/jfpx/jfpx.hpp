@@ -14,6 +14,7 @@
 #include <jfpx/joint.hpp>
 #include <jfpx/material.hpp>
 #include <jfpx/nearest.hpp>
+#include <jfpx/neighbors.hpp>
 #include <jfpx/periodic.hpp>
 #include <jfpx/query.hpp>
 #include <jfpx/random.hpp>

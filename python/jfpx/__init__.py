@@ -16,6 +16,7 @@ from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Exp
 from ._joints import (BallJoint, DistanceJoint, FixedJoint, HingeJoint, JointId, JointState,
                       SliderJoint, WheelJoint)
 from ._nearest import Nearest, PeriodicNearest, find_nearest
+from ._neighbors import Neighbors, find_neighbors
 from ._recording import Recording, RecordingWriter, TrajectoryWriter
 from ._scene import Scene, scene_names
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
@@ -28,9 +29,9 @@ __all__ = [
     "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactRows", "Contacts",
     "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError",
     "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "InvalidArgument", "InvalidScene",
-    "InvalidSnapshot", "JointId", "JointState", "Nearest", "OutOfMemory", "PeriodicContactRows",
+    "InvalidSnapshot", "JointId", "JointState", "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows",
     "PeriodicContacts", "PeriodicNearest", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
     "RecordingWriter", "Rows", "STAY", "Scene", "SliderJoint", "SphereCollider", "Spring",
     "States", "StepReport", "TrajectoryWriter", "WheelJoint", "World", "WorldContacts", "available_backends",
-    "find_contacts", "find_nearest", "find_pairs", "scene_names",
+    "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "scene_names",
 ]

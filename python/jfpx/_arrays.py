@@ -303,7 +303,7 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     has_rows = any(row is not None and not isinstance(row, str) and np.ndim(row) > 0 for row in lengths)
     if has_rows and systems is None:
         raise InvalidArgument("periodic is a matrix; it must be the three lengths of an orthogonal cell, such as "
-                              "periodic.diagonal()")
+                              "periodic.diagonal(); find_neighbors(cell=) takes cells of any shape")
     if not lengths and systems == 0:
         return np.empty((0, 3))
     if not has_rows:
@@ -332,6 +332,85 @@ def _cell(lengths: Any) -> list[float]:
             raise InvalidArgument(f"periodic is {tuple(lengths)}; it must be the three lengths of the cell, and "
                                   "None along axes that do not repeat, such as (10, 10, None)")
     return [math.nan if length is None else number(length, "periodic") for length in lengths]
+
+
+def lattices(cell: Any, pbc: Any, batched: bool) -> tuple[np.ndarray | None, np.ndarray, int | None]:
+    """The vectors of cells as rows (C, 3, 3) of float64, whether each repeats along its vectors (C, 3), and the
+    number of systems C; one cell and None if it is that of all systems. No vectors for None. Takes three
+    lengths, each None where an orthogonal cell does not repeat, or a matrix of rows; if `batched`, also
+    matrices or flags of each system."""
+    flags = None if pbc is None else _flags(pbc, batched)
+    if cell is None:
+        if flags is not None and flags.any():
+            raise InvalidArgument(f"pbc is {pbc!r}, and there is no cell; pass its vectors as cell")
+        return None, np.zeros((1, 3), bool), None
+    if isinstance(cell, (list, tuple)) and len(cell) == 3 and any(length is None for length in cell):
+        cell = [0.0 if length is None else number(length, "cell") for length in cell]
+    if not hasattr(cell, "dtype") and not hasattr(cell, "__array__"):
+        plain_numbers(cell, "cell")  # refuses booleans and texts
+    rows = converted(cell, "cell", np.float64)
+    if rows.shape == (3,):
+        rows = np.diag(rows)
+    if rows.shape[-2:] != (3, 3) or rows.ndim > (3 if batched else 2):
+        raise InvalidArgument(f"cell has shape {rows.shape}; it must be (3, 3), the vectors of the cell as rows, "
+                              + ("three lengths, or (systems, 3, 3)" if batched else "or three lengths"))
+    if flags is None:
+        flags = rows.any(axis=-1)
+    if rows.ndim == 2 and flags.ndim == 1:
+        return np.ascontiguousarray(rows)[np.newaxis], flags[np.newaxis], None
+    if rows.ndim == 3 and flags.ndim == 2 and len(rows) != len(flags):
+        raise InvalidArgument(f"cell has {len(rows)} systems, and pbc {len(flags)}")
+    systems = len(rows) if rows.ndim == 3 else len(flags)
+    return (np.ascontiguousarray(np.broadcast_to(rows, (systems, 3, 3))),
+            np.ascontiguousarray(np.broadcast_to(flags, (systems, 3))), systems)
+
+
+def _flags(value: Any, batched: bool) -> np.ndarray:
+    """Booleans of shape (3,), or also (C, 3) if `batched`."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different lengths
+        array = np.array("")
+    are_bools = array.dtype.kind == "b"
+    if not are_bools and (array.dtype.kind not in "iu" or ((array != 0) & (array != 1)).any()):
+        raise InvalidArgument(f"pbc is {value!r}; it must be a bool or three bools")
+    if array.ndim == 0:
+        array = np.repeat(array, 3)
+    if array.shape[-1] != 3:
+        raise InvalidArgument(f"pbc has {array.shape[-1]} flags; it must have 3")
+    if array.ndim > (2 if batched else 1):
+        raise InvalidArgument(f"pbc has shape {array.shape}; it must be a bool or three bools"
+                              + (", or (systems, 3)" if batched else ""))
+    return array if are_bools else array.astype(bool)
+
+
+def systems(batch: Any, size: int, cells: int | None) -> np.ndarray:
+    """Offsets of systems as uint64, from the number of the system of each of `size` points, or from offsets.
+    @param cells number of cells, which are those of the systems; None: systems without points do not count"""
+    array = to_host(batch if hasattr(batch, "dtype") else np.asarray(batch), "batch")
+    if array.ndim != 1 or (array.size > 0 and array.dtype.kind not in "iu"):
+        raise InvalidArgument(f"batch has shape {array.shape} and dtype {array.dtype}; it must be the number of the "
+                              "system of each point, or the offsets of the systems, integers in one dimension")
+    if array.size > 0 and array.min() < 0:
+        raise InvalidArgument(f"batch contains {array.min()}; it must be >= 0")
+    are_offsets = array.size > 0 and array[0] == 0 and array[-1] == size
+    if array.size != size:
+        if not are_offsets:
+            raise InvalidArgument(f"batch has {array.size} elements; it must have the number of the system of each of "
+                                  f"{size} points, or the offsets of the systems from 0 to {size}")
+        return np.ascontiguousarray(array, np.uint64)
+    if are_offsets:
+        raise InvalidArgument(f"batch ascends from 0 to {size} in as many elements; append {size} to offsets of "
+                              "systems, or number the systems without gaps")
+    if (array[1:] < array[:-1]).any():
+        raise InvalidArgument("batch does not ascend; sort the points by it, as "
+                              "numpy.argsort(batch, kind=\"stable\") does")
+    if cells is None:
+        changes = np.flatnonzero(array[1:] != array[:-1]) + 1
+        return np.concatenate([[0], changes, [size] * (size > 0)]).astype(np.uint64)
+    if size > 0 and array[-1] >= cells:
+        raise InvalidArgument(f"batch has the system {array[-1]}, and there are cells of {cells} systems")
+    return np.searchsorted(array, np.arange(cells + 1)).astype(np.uint64)
 
 
 class Output(NamedTuple):

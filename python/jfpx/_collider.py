@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import threading
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
@@ -535,6 +536,19 @@ def _exact_half(cutoff: float, dtype: str) -> float | None:
         value = real(cutoff)
     radius = value / real(2)  # before version 2, NumPy divides a float32 by 2 in float64
     return float(radius) if 0 < value < np.inf and radius + radius == value else None
+
+
+def _check_points(positions: Any, index_dtype: Any, function: str) -> tuple[Callable[[np.ndarray], Any], np.ndarray, str]:
+    """The function that converts results to the kind of the points, the points as rows in host memory, and the name
+    of the type of indices."""
+    if _device.is_on_device(positions):
+        raise InvalidArgument(f"positions are on a device; {function}() takes arrays in host memory")
+    convert = _arrays.from_host(positions)
+    positions = _arrays.rows(positions, "positions", 3)
+    index = _check_form("coo", index_dtype, None)
+    if index == "int32" and positions.shape[0] > 2**31:
+        raise InvalidArgument("more than 2^31 points require index_dtype=\"int64\"")
+    return convert, positions, index
 
 
 def _check_form(output: Any, index_dtype: Any, out: Any) -> str:

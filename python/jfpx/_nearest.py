@@ -6,9 +6,8 @@ from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 
-from . import _arrays, _device
-from ._collider import _check_form
-from ._errors import InvalidArgument
+from . import _arrays
+from ._collider import _check_points
 
 
 class Nearest(NamedTuple):
@@ -99,18 +98,12 @@ def find_nearest(positions: Any, k: int, *, query: Any = None, periodic: Any = N
     KeyboardInterrupt
         Ctrl-C was pressed during a search of the main thread.
     """
-    if _device.is_on_device(positions):
-        raise InvalidArgument("positions are on a device; find_nearest() takes arrays in host memory")
-    convert = _arrays.from_host(positions)
-    positions = _arrays.rows(positions, "positions", 3)
+    convert, positions, index = _check_points(positions, index_dtype, "find_nearest")
     dtype = positions.dtype
     if query is not None:
         query = _arrays.rows(query, "query", 3, dtype)
     cells = _arrays.cells(periodic, None)
-    index = _check_form("coo", index_dtype, None)
     size, rows = positions.shape[0], (positions if query is None else query).shape[0]
-    if index == "int32" and size > 2**31:
-        raise InvalidArgument("more than 2^31 points require index_dtype=\"int64\"")
     k = _arrays.count(k, "k", 0, max(size - 1, 0) if query is None else size)
     indices, distances = np.empty((rows, k), index), np.empty((rows, k), dtype)
     shifts = None if cells is None else np.empty((rows, k, 3), np.int32)

@@ -65,6 +65,7 @@ void JFPX_BIND(nanobind::module_& module) {
   jfpx::python::register_exceptions();
   jfpx::python::bind_collider(module);
   jfpx::python::bind_nearest(module);
+  jfpx::python::bind_neighbors(module);
 #if JFPX_HAS_CUDA
   jfpx::python::bind_device_collider(module);
 #endif

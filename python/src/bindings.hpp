@@ -96,6 +96,11 @@ template <class T>
 Vec3 vec3_at(const Rows<T>& rows, std::size_t i) {
   return {rows(i, 0), rows(i, 1), rows(i, 2)};
 }
+inline std::vector<Vec3> to_points(const Rows<const Real>& rows) {
+  std::vector<Vec3> points(rows.shape(0));
+  for (std::size_t i = 0; i < points.size(); ++i) points[i] = vec3_at(rows, i);
+  return points;
+}
 /// Cells from rows of three lengths, each NaN along an axis that does not repeat.
 inline std::vector<PeriodicCell> to_cells(const Rows<const double>& lengths) {
   std::vector<PeriodicCell> cells(lengths.shape(0));
@@ -128,6 +133,7 @@ SphereColliderOptions collider_options(const std::string& backend, const std::st
 
 void bind_collider(nb::module_& module);
 void bind_nearest(nb::module_& module);
+void bind_neighbors(nb::module_& module);
 /// Only with the CUDA backend.
 void bind_device_collider(nb::module_& module);
 void bind_scene(nb::module_& module);

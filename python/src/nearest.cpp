@@ -6,12 +6,6 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-std::vector<Vec3> to_points(const Rows<const Real>& rows) {
-  std::vector<Vec3> points(rows.shape(0));
-  for (std::size_t i = 0; i < points.size(); ++i) points[i] = vec3_at(rows, i);
-  return points;
-}
-
 /// Writes the rows of the result, k long, to arrays of their size.
 template <class Index>
 void write_nearest(const Rows<const Real>& positions, const std::optional<Rows<const Real>>& query,

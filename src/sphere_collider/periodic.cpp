@@ -136,7 +136,7 @@ std::vector<PeriodicContact> find_periodic_contacts_in_systems(
     SphereCollider& collider, std::span<const SphereInstance> spheres,
     std::span<const std::uint64_t> offsets, std::span<const PeriodicCell> cells) {
   detail::check_offsets(offsets, spheres.size());
-  detail::check_number_of_cells(cells, offsets);
+  detail::check_number_of_cells(cells.size(), offsets);
   detail::check_spheres(spheres);
   detail::check_in_cells(cells, spheres, offsets);
   std::vector<PeriodicContact> result;

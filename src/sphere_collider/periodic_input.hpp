@@ -49,10 +49,9 @@ inline void check_in_cell(const PeriodicCell& cell, std::span<const SphereInstan
 }
 
 /// @throws InvalidArgument unless there is a cell for each system
-inline void check_number_of_cells(std::span<const PeriodicCell> cells,
-                                  std::span<const std::uint64_t> offsets) {
-  if (cells.size() + 1 == offsets.size()) return;
-  throw InvalidArgument("there are " + std::to_string(cells.size()) +
+inline void check_number_of_cells(std::size_t cells, std::span<const std::uint64_t> offsets) {
+  if (cells + 1 == offsets.size()) return;
+  throw InvalidArgument("there are " + std::to_string(cells) +
                         " periodic cells; there must be one for each of " +
                         std::to_string(offsets.size() - 1) + " systems");
 }

@@ -11,7 +11,13 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cpu/contact_writer.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_baseline.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_scalar.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/lattice.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/nearest.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_bins.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_cutoffs.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_kernels_baseline.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_system.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbors.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cpu/sphere_collider_cpu.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/all_pairs.cu
@@ -35,12 +41,16 @@ list(APPEND JFPX_CUDA_SOURCES
 # them at run time. cpu/kernels.hpp explains why they must not share inline functions with other sources.
 set_source_files_properties(
   ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_baseline.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_scalar.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_scalar.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_kernels_baseline.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(JFPX_PROCESSOR STREQUAL "x86_64")
   list(APPEND JFPX_SOURCES
     ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
-    ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp)
-  set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
+    ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp
+    ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_kernels_avx2.cpp)
+  set_source_files_properties(
+    ${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx2.cpp
+    ${CMAKE_CURRENT_LIST_DIR}/cpu/neighbor_kernels_avx2.cpp
     PROPERTIES COMPILE_OPTIONS "${JFPX_AVX2_FLAGS}")
   # g++ 12 reports an uninitialized value in its own _mm512_undefined_epi32() (GCC bug 105593).
   set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/cpu/kernels_avx512.cpp

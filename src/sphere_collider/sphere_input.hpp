@@ -93,8 +93,10 @@ inline void check_count(std::span<const SpherePair> pairs) {
   }
 }
 
-/// @throws InvalidArgument unless the offsets of systems ascend from 0 to the number of spheres.
-inline void check_offsets(std::span<const std::uint64_t> offsets, std::size_t spheres) {
+/// @param items what the systems consist of, in messages
+/// @throws InvalidArgument unless the offsets of systems ascend from 0 to the number of items.
+inline void check_offsets(std::span<const std::uint64_t> offsets, std::size_t count,
+                          const std::string& items = "spheres") {
   if (offsets.empty() || offsets.front() != 0) {
     throw InvalidArgument("offsets must begin with 0");
   }
@@ -105,9 +107,9 @@ inline void check_offsets(std::span<const std::uint64_t> offsets, std::size_t sp
                             std::to_string(offsets[i - 1]));
     }
   }
-  if (offsets.back() != spheres) {
+  if (offsets.back() != count) {
     throw InvalidArgument("the last offset is " + std::to_string(offsets.back()) +
-                          "; it must be the number of spheres, " + std::to_string(spheres));
+                          "; it must be the number of " + items + ", " + std::to_string(count));
   }
 }
 

@@ -37,6 +37,11 @@ def test_an_example_runs_and_draws_its_picture(tmp_path, name, arguments, text):
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_forces_by_torch_are_the_differences_of_the_energy():
+    pytest.importorskip("torch")
+    assert "forces are the differences of the energy\npressure without motion: " in run("lennard_jones.py")
+
+
 def test_the_pile_has_the_same_bits_on_a_gpu():
     cuda = next(row for row in jfpx.available_backends() if row["backend"] == "cuda")
     if not cuda["usable"]:

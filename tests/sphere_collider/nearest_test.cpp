@@ -18,7 +18,7 @@ inline namespace JFPX_ABI {
 namespace test {
 namespace {
 
-using Points = std::vector<Vec3>;
+using PointList = std::vector<Vec3>;
 
 struct Neighbor {
   double square;
@@ -54,10 +54,10 @@ Neighbor nearest_image(const Vec3& a, const Vec3& b, std::uint32_t index,
 }
 
 /// @param queries null: the points, each without itself
-NearestPoints brute_force_nearest(const Points& points, const Points* queries, std::size_t k,
+NearestPoints brute_force_nearest(const PointList& points, const PointList* queries, std::size_t k,
                                   const std::optional<PeriodicCell>& cell) {
   NearestPoints found{k, {}, {}, {}};
-  const Points& rows = queries == nullptr ? points : *queries;
+  const PointList& rows = queries == nullptr ? points : *queries;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     std::vector<Neighbor> all;
     for (std::uint32_t j = 0; j < points.size(); ++j) {
@@ -80,9 +80,10 @@ void expect_equal(const NearestPoints& found, const NearestPoints& expected) {
   EXPECT_EQ(found.shifts, expected.shifts);
 }
 
-/// Points in [-side, side]^3. @param grid spacing of a grid, so that many distances are equal; or 0
-Points random_points(std::size_t n, Real side, Real grid, Random& random) {
-  Points points(n);
+/// Points in [-side, side]^3. @param grid spacing of a grid, so that many distances are equal;
+/// or 0
+PointList random_points(std::size_t n, Real side, Real grid, Random& random) {
+  PointList points(n);
   for (Vec3& p : points) {
     p = random.uniform_in_box({-side, -side, -side}, {side, side, side});
     for (int k = 0; k < 3 && grid > 0; ++k) p[k] = std::round(p[k] / grid) * grid;
@@ -100,8 +101,8 @@ TEST(Nearest, PointsAreThoseOfALoopOverAllPoints) {
     for (const Real grid : {Real(0), Real(0.25)}) {
       for (const auto& [n, k] :
            {std::pair{1, 0}, {2, 1}, {13, 12}, {300, 1}, {700, 8}, {500, 60}}) {
-        const Points points = random_points(static_cast<std::size_t>(n), 2, grid, random);
-        const Points queries = random_points(100, 3, grid, random);
+        const PointList points = random_points(static_cast<std::size_t>(n), 2, grid, random);
+        const PointList queries = random_points(100, 3, grid, random);
         const auto size = static_cast<std::size_t>(k);
         const NearestPoints of_points = brute_force_nearest(points, nullptr, size, cell);
         const NearestPoints of_queries = brute_force_nearest(points, &queries, size, cell);
@@ -118,7 +119,7 @@ TEST(Nearest, PointsAreThoseOfALoopOverAllPoints) {
 TEST(Nearest, PointsOfAllScalesAreThoseOfALoopOverAllPoints) {
   Random random(base_seed());
   SCOPED_TRACE(seed_note());
-  Points points;
+  PointList points;
   for (const Real side : {Real(1e-12), Real(1e-3), Real(1), Real(1e6), Real(1e19)}) {
     for (const Vec3& p : random_points(60, side, 0, random)) points.push_back(p);
   }
@@ -127,19 +128,19 @@ TEST(Nearest, PointsOfAllScalesAreThoseOfALoopOverAllPoints) {
 }
 
 TEST(Nearest, OfTwoImagesHalfALengthApartTheLowerShiftIsListed) {
-  const Points points{{0, 0, 0}, {1, 0, 0}};
+  const PointList points{{0, 0, 0}, {1, 0, 0}};
   const NearestPoints found = find_nearest(points, 1, {.cell = PeriodicCell{{2, 2, 2}}});
   EXPECT_EQ(found.shifts, (std::vector<ImageShift>{{-1, 0, 0}, {0, 0, 0}}));
   EXPECT_EQ(found.distances, (std::vector<Real>{1, 1}));
 }
 
 TEST(Nearest, WithoutPointsHasEmptyRows) {
-  EXPECT_TRUE(find_nearest(Points{}, 0).indices.empty());
-  EXPECT_TRUE(find_nearest(Points{}, Points(3), 0).indices.empty());
-  EXPECT_TRUE(find_nearest(Points(3), Points{}, 2).indices.empty());
+  EXPECT_TRUE(find_nearest(PointList{}, 0).indices.empty());
+  EXPECT_TRUE(find_nearest(PointList{}, PointList(3), 0).indices.empty());
+  EXPECT_TRUE(find_nearest(PointList(3), PointList{}, 2).indices.empty());
 }
 
-std::string error_of(const Points& points, const Points* queries, std::size_t k,
+std::string error_of(const PointList& points, const PointList* queries, std::size_t k,
                      const NearestOptions& options = {}) {
   try {
     if (queries == nullptr) {
@@ -156,12 +157,12 @@ std::string error_of(const Points& points, const Points* queries, std::size_t k,
 TEST(Nearest, BadInputIsNamed) {
   using ::testing::EndsWith;
   using ::testing::HasSubstr;
-  const Points points(4);
+  const PointList points(4);
   EXPECT_EQ(error_of(points, nullptr, 4),
             "k is 4; it must be at most the number of other points, 3");
   EXPECT_EQ(error_of(points, &points, 5), "k is 5; it must be at most the number of points, 4");
   EXPECT_EQ(error_of({{0, 0, 0}, {0, NAN, 0}}, nullptr, 1), "point 1: y is nan; it must be finite");
-  const Points bad{{0, 0, INFINITY}};
+  const PointList bad{{0, 0, INFINITY}};
   EXPECT_EQ(error_of(points, &bad, 1), "query 0: z is inf; it must be finite");
   EXPECT_THAT(error_of(points, nullptr, 1, {.threads = 999}), HasSubstr("threads is 999"));
   EXPECT_THAT(error_of(points, nullptr, 1, {.cell = PeriodicCell{{1, 0, 1}}}),
@@ -176,7 +177,7 @@ TEST(Nearest, BadInputIsNamed) {
 
 TEST(Nearest, ASearchCanBeInterrupted) {
   struct Interrupted {};
-  const Points points(1000);
+  const PointList points(1000);
   const Interrupt interrupt([] { throw Interrupted(); }, Interrupt::Clock::duration::zero());
   EXPECT_THROW(find_nearest(points, 3), Interrupted);
 }

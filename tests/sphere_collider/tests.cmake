@@ -7,6 +7,8 @@ jfpx_add_test(sphere_collider_cpu_test
     sphere_collider/contact_list_test.cpp
     sphere_collider/interrupt_test.cpp
     sphere_collider/nearest_test.cpp
+    sphere_collider/neighbor_systems_test.cpp
+    sphere_collider/neighbors_test.cpp
     sphere_collider/periodic_test.cpp
     sphere_collider/cpu/sphere_collider_cpu_test.cpp
     support/sphere_fixtures.cpp)

@@ -114,7 +114,7 @@ std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& sphere
                                                       ArrayResult result, bool both_orders,
                                                       Stream stream) {
   detail::check_offsets(offsets, spheres.count);
-  detail::check_number_of_cells(cells, offsets);
+  detail::check_number_of_cells(cells.size(), offsets);
   const DeviceGuard guard(impl_->device);
   impl_->follow(stream);
   impl_->reserve_systems(spheres.count, offsets);
