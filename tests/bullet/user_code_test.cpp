@@ -1,5 +1,6 @@
 /// Callbacks, filters and near callbacks that change bodies, manifolds and the pair cache during a
 /// dispatch have the same effects as in stock Bullet.
+#include "tests/bullet/bullet_memory.hpp"
 #include "tests/bullet/random_terrain.hpp"
 
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
@@ -254,6 +255,55 @@ class UserCode : public ::testing::Test {
   }
 };
 
+/// Removes the first body while the dispatcher asks for the last pair, bodies 2 and 3.
+template <class Base>
+class Remover final : public Base {
+ public:
+  using Base::Base;
+  bool needsCollision(const btCollisionObject* a, const btCollisionObject* b) override {
+    btRigidBody& first = *g_current->bodies[0];
+    const bool is_last_pair = std::min(a->getUserIndex(), b->getUserIndex()) == 2;
+    if (is_last_pair && first.getBroadphaseHandle() != nullptr) {
+      g_current->world.removeRigidBody(&first);
+    }
+    return Base::needsCollision(a, b);
+  }
+};
+
+// Bullet's loop over the pairs refers to the entry of the pair that it visits. If a filter removes
+// another pair, Bullet moves the last pair to its entry, stores the new algorithm of the last pair
+// behind the array, and never destroys it.
+TEST_F(UserCode, LosesTheMemoryThatBulletLoses) {
+  TwinOptions options;
+  options.stock = [](btCollisionConfiguration* c) {
+    return std::make_unique<Remover<btCollisionDispatcher>>(c);
+  };
+  options.ours = [](btCollisionConfiguration* c) {
+    return std::make_unique<Remover<CollisionDispatcher>>(c, DispatcherOptions{.minimum_batch = 0});
+  };
+  BulletMemory memory;
+  const BulletWorld *stock = nullptr, *ours = nullptr;
+  {
+    Twins twins(options);
+    stock = &twins.stock();
+    ours = &twins.ours();
+    twins.both([](BulletWorld& w) {
+      for (int i = 0; i < 2; ++i) w.add_sphere(1, btVector3(0, btScalar(i), 0));
+      for (int i = 0; i < 2; ++i) {
+        auto* compound = new btCompoundShape();
+        w.keep(compound);
+        compound->addChildShape(btTransform::getIdentity(), w.keep(new btSphereShape(1)));
+        w.add(compound, btVector3(10, btScalar(i), 0));
+      }
+    });
+    ASSERT_TRUE(twins.step());
+    EXPECT_EQ(twins.stats().batches, 1u);
+    ASSERT_TRUE(twins.step(2));
+  }
+  EXPECT_FALSE(memory.blocks_of(stock).empty());
+  EXPECT_EQ(memory.blocks_of(stock), memory.blocks_of(ours));
+}
+
 TEST_F(UserCode, MayChangeWhatLaterPairsDependOn) {
   const std::uint64_t seed = test_seed();
   std::uint64_t batches = 0, written = 0;
@@ -274,10 +324,19 @@ TEST_F(UserCode, MayChangeWhatLaterPairsDependOn) {
     g_default_near_callback = random.below(3) == 0
                                   ? btNearCallback(btCollisionDispatcher::defaultNearCallback)
                                   : btNearCallback(CollisionDispatcher::defaultNearCallback);
-    MeddledWorlds worlds(g_seed, deterministic);
-    for (int step = 0; step < 15; ++step) ASSERT_TRUE(worlds.step()) << "step " << step;
-    batches += worlds.twins.stats().batches;
-    written += worlds.twins.stats().written;
+    BulletMemory memory;
+    const BulletWorld *stock = nullptr, *ours = nullptr;
+    {
+      MeddledWorlds worlds(g_seed, deterministic);
+      stock = &worlds.twins.stock();
+      ours = &worlds.twins.ours();
+      for (int step = 0; step < 15; ++step) ASSERT_TRUE(worlds.step()) << "step " << step;
+      batches += worlds.twins.stats().batches;
+      written += worlds.twins.stats().written;
+    }
+    // See LosesTheMemoryThatBulletLoses.
+    EXPECT_EQ(memory.blocks_of(stock), memory.blocks_of(ours));
+    EXPECT_TRUE(memory.blocks_of(nullptr).empty());
   }
   EXPECT_GT(batches, 300u);
   EXPECT_GT(written, 1000u);

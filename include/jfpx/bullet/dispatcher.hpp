@@ -28,9 +28,9 @@ struct DispatcherOptions {
 /// A btCollisionDispatcher that computes the pairs of a dispatch in one batch. It tests all pairs
 /// of two spheres on the CPU or a GPU. It also computes pairs of a sphere with a btBoxShape, a
 /// btStaticPlaneShape or a terrain, and of spheres in compounds, and runs Bullet's algorithms for
-/// the other pairs of boxes, capsules, cylinders, cones, spheres and planes: on all threads, unless
-/// a callback or an overridden filter can observe the order of the pairs. Bullet computes the pairs
-/// of all other shapes.
+/// the other pairs of boxes, capsules, cylinders, cones, spheres, planes, multi-spheres, and convex
+/// hulls without polyhedral features: on all threads, unless a callback or an overridden filter can
+/// observe the order of the pairs. Bullet computes the pairs of all other shapes.
 ///
 /// Manifolds, their order, every field of every point, callbacks, and therefore trajectories are
 /// those of btCollisionDispatcher, bit for bit. No create function is registered: the pairs keep

@@ -2,8 +2,9 @@
 ///
 /// In Bullet 3.24, processCollision() of the algorithms of PairTable has no global state and no
 /// profile zone, calls no dispatcher once the manifold exists, and ignores the debug drawer.
-/// Polyhedra are the exception, because btPolyhedralContactClipping counts its tests in global
-/// variables; boxes can have polyhedral features only in a btConvexConvexAlgorithm.
+/// Two polyhedra with polyhedral features are the exception, because btPolyhedralContactClipping
+/// counts its tests in global variables. kConvex excludes hulls with such features, and an
+/// algorithm of two boxes is not a btConvexConvexAlgorithm.
 #include "src/bullet/dispatch/convex_commit.hpp"
 
 #include "src/bullet/dispatch/body_wrapper.hpp"

@@ -10,7 +10,9 @@
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
+#include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
+#include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
@@ -32,6 +34,11 @@ bool has_stock_filter(const btCollisionObject& body) {
   const std::type_info* type = type_info_of(body);
   return type == &typeid(btRigidBody) || type == &typeid(btCollisionObject) ||
          type == &typeid(btGhostObject) || type == &typeid(btPairCachingGhostObject);
+}
+
+bool is_plain_hull(const btCollisionShape& shape) {
+  return is_exactly<btConvexHullShape>(shape) &&
+         static_cast<const btConvexHullShape&>(shape).getConvexPolyhedron() == nullptr;
 }
 
 template <class... Exact>
@@ -63,6 +70,10 @@ unsigned traits_of(const btCollisionShape& shape) {
       return is_one_of<btCylinderShape, btCylinderShapeX, btCylinderShapeZ>(shape) ? kConvex : 0;
     case CONE_SHAPE_PROXYTYPE:
       return is_one_of<btConeShape, btConeShapeX, btConeShapeZ>(shape) ? kConvex : 0;
+    case CONVEX_HULL_SHAPE_PROXYTYPE:
+      return is_plain_hull(shape) ? kConvex : 0;
+    case MULTI_SPHERE_SHAPE_PROXYTYPE:
+      return is_exactly<btMultiSphereShape>(shape) ? kConvex : 0;
     default:
       return 0;
   }

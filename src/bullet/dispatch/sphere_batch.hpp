@@ -25,7 +25,9 @@ enum BodyTrait : std::uint8_t {
   kPlane = 16,           ///< exactly a btStaticPlaneShape
   kHasIgnoreList = 32,   ///< has an ignore list or a filter, which must be evaluated
   kCustomMaterial = 64,  ///< write_contact() is insufficient for its contacts
-  kConvex = 128,         ///< exactly one of Bullet's boxes, capsules, cylinders or cones
+  /// Exactly one of Bullet's boxes, capsules, cylinders, cones or multi-spheres, or a convex hull
+  /// without polyhedral features.
+  kConvex = 128,
 };
 
 /// The traits of a body with this shape that follow from the shape.
