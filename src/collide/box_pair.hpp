@@ -27,6 +27,20 @@ struct LeastOverlap {
   Vec3 normal;        ///< unit, in the axes of a, from b to a
 };
 
+/// The closest points of two edges.
+struct EdgePoints {
+  Vec3 on_a, on_b;  ///< [m]
+
+  JFPX_HD Vec3 middle() const { return (on_a + on_b) * Real(0.5); }
+  /// Whether the points are as far apart as two solids along an axis, in its direction. Otherwise,
+  /// the edges do not cross, and the solids overlap less along another axis.
+  JFPX_HD bool are_on(const LeastOverlap& axis) const {
+    const Real tolerance = 8 * axis.error + absolute(axis.distance) * Real(0.1);
+    const Vec3 apart = add_scaled(on_a - on_b, axis.normal, -axis.distance);
+    return length_squared(apart) <= tolerance * tolerance;
+  }
+};
+
 JFPX_HD constexpr Vec3 unit_axis(int i) {
   return {i == 0 ? Real(1) : Real(0), i == 1 ? Real(1) : Real(0), i == 2 ? Real(1) : Real(0)};
 }
@@ -58,9 +72,20 @@ JFPX_HD inline const LeastOverlap& preferred(const LeastOverlap& first, const Le
   return later.axis >= 0 && later.distance > first.distance + tolerance ? later : first;
 }
 
+/// As preferred() for a face and a pair of edges. The common normal of the edges does not replace
+/// that of a face within a tenth of a degree of it, because a face has several points.
+JFPX_HD inline const LeastOverlap& preferred_to_edges(const LeastOverlap& face,
+                                                      const LeastOverlap& edges) {
+  constexpr Real kLeastAngle = Real(0.0017);
+  const bool is_same = length_squared(face.normal - edges.normal) < kLeastAngle * kLeastAngle;
+  return is_same ? face : preferred(face, edges);
+}
+
 /// False if an axis separates the boxes by more than `margin`. Otherwise writes the axis of least
 /// overlap, or of the largest separation, to *best.
-JFPX_HD inline bool least_overlap(const BoxPair& pair, Real margin, LeastOverlap* best) {
+/// @param is_steady whether a face is preferred to edges with nearly the same normal
+JFPX_HD inline bool least_overlap(const BoxPair& pair, Real margin, bool is_steady,
+                                  LeastOverlap* best) {
   const Real error = 8 * kEpsilon * pair.size;
   LeastOverlap face_a, face_b, edges;
   for (int i = 0; i < 3; ++i) {
@@ -78,7 +103,8 @@ JFPX_HD inline bool least_overlap(const BoxPair& pair, Real margin, LeastOverlap
       if (!try_axis(pair, 6 + 3 * i + j, unit, error / sine, margin, &edges)) return false;
     }
   }
-  *best = preferred(preferred(face_a, face_b), edges);
+  const LeastOverlap& face = preferred(face_a, face_b);
+  *best = is_steady ? preferred_to_edges(face, edges) : preferred(face, edges);
   return true;
 }
 
@@ -254,7 +280,7 @@ JFPX_HD inline Manifold collide_boxes(const Box& a, const Transform& pose_a, con
                                       const Transform& pose_b) {
   const BoxPair pair = make_box_pair(a, pose_a, b, pose_b);
   LeastOverlap least;
-  if (!least_overlap(pair, 0, &least)) return {};
+  if (!least_overlap(pair, 0, false, &least)) return {};
   return box_manifold(pair, least, pose_a, pose_b, 0);
 }
 

@@ -19,8 +19,29 @@ struct BoxTriangle : LocalTriangle {
   /// that axis and edge k of the triangle.
   static constexpr int kEdgeAxis = kFaceAxis + 3;
 
+  JFPX_HD EdgePoints edge_points(const LeastOverlap& edges) const;
+  JFPX_HD bool has_points(const LeastOverlap& axis) const {
+    return axis.axis < kEdgeAxis || edge_points(axis).are_on(axis);
+  }
   JFPX_HD Real lowest(const Vec3& axis) const { return -projected_half_length(half, axis); }
 };
+
+/// The closest points of an edge of the box and an edge of the triangle, which are not parallel
+/// (Goldman 1990).
+JFPX_HD inline EdgePoints BoxTriangle::edge_points(const LeastOverlap& edges) const {
+  const auto clamp = [](Real x, Real lower, Real upper) {
+    return x > upper ? upper : x < lower ? lower : x;
+  };
+  const int i = (edges.axis - kEdgeAxis) / 3, k = (edges.axis - kEdgeAxis) % 3;
+  const Vec3 dir_a = unit_axis(i), dir_b = edge(k);
+  Vec3 on_a = jfpx::detail::support(half, Mat3{}, {}, -edges.normal);
+  on_a[i] = 0;
+  const Vec3 across = corner[k] - on_a, common = cross(dir_a, dir_b);
+  const Real scale = Real(1) / length_squared(common);
+  const Real s = clamp(dot(cross(across, dir_b), common) * scale, -half[i], half[i]);
+  const Real t = clamp(dot(cross(across, dir_a), common) * scale, 0, 1);
+  return {add_scaled(on_a, dir_a, s), add_scaled(corner[k], dir_b, t)};
+}
 
 /// @param shift [m], world axes, motion of the box since the start of the step
 JFPX_HD inline BoxTriangle make_box_triangle(const Box& box, const Mat3& axes,
@@ -147,22 +168,6 @@ JFPX_HD inline void points_on_box(const BoxTriangle& pair, int face, Real side, 
   }
 }
 
-/// The midpoint between the closest points of an edge of the box and an edge of the triangle, which
-/// are not parallel (Goldman 1990).
-JFPX_HD inline Vec3 edge_point(const BoxTriangle& pair, int i, int k, const LeastOverlap& least) {
-  const auto clamp = [](Real x, Real lower, Real upper) {
-    return x > upper ? upper : x < lower ? lower : x;
-  };
-  const Vec3 dir_a = unit_axis(i), dir_b = pair.edge(k);
-  Vec3 on_a = support(pair.half, Mat3{}, {}, -least.normal);
-  on_a[i] = 0;
-  const Vec3 across = pair.corner[k] - on_a, common = cross(dir_a, dir_b);
-  const Real scale = Real(1) / length_squared(common);
-  const Real s = clamp(dot(cross(across, dir_b), common) * scale, -pair.half[i], pair.half[i]);
-  const Real t = clamp(dot(cross(across, dir_a), common) * scale, 0, 1);
-  return (add_scaled(on_a, dir_a, s) + add_scaled(pair.corner[k], dir_b, t)) * Real(0.5);
-}
-
 /// The contact manifold of a box and a triangle, in the axes of the box. The normal points from the
 /// triangle to the box.
 /// @param least  of find_contact_axis()
@@ -184,8 +189,8 @@ JFPX_HD inline Manifold triangle_manifold(const BoxTriangle& pair, const LeastOv
   } else if (least.distance <= margin) {
     first_feature = 2 * kFeaturesOfFace;
     const int edges = least.axis - kEdgeAxis;
-    manifold.points[manifold.count++] = {edge_point(pair, edges / 3, edges % 3, least),
-                                         least.distance, static_cast<std::uint32_t>(edges)};
+    manifold.points[manifold.count++] = {pair.edge_points(least).middle(), least.distance,
+                                         static_cast<std::uint32_t>(edges)};
   }
   for (int i = 0; i < manifold.count; ++i) manifold.points[i].feature += first_feature;
   return manifold;

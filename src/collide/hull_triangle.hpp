@@ -17,6 +17,15 @@ struct HullTriangle : LocalTriangle {
   /// cross product of its edge i and edge k of the triangle.
   static constexpr int kEdgeAxis = kFaceAxis + static_cast<int>(Hull::kMaxFaces);
 
+  JFPX_HD EdgePoints edge_points(const LeastOverlap& edges) const {
+    const int of_hull = (edges.axis - kEdgeAxis) / 3, k = (edges.axis - kEdgeAxis) % 3;
+    const PolyhedronEdge side = hull.edge(of_hull);
+    const Vec3 a = hull.vertex(side.a);
+    return closest_of_edges(a, hull.vertex(side.b) - a, corner[k], edge(k));
+  }
+  JFPX_HD bool has_points(const LeastOverlap& axis) const {
+    return axis.axis < kEdgeAxis || edge_points(axis).are_on(axis);
+  }
   JFPX_HD Real lowest(const Vec3& axis) const { return -hull.support(-axis); }
 };
 
@@ -75,9 +84,7 @@ JFPX_HD void visit_contact_points(const HullTriangle& pair, const LeastOverlap& 
   if (least.axis >= HullTriangle::kEdgeAxis) {
     if (!(least.distance <= margin)) return;
     const int edges = least.axis - HullTriangle::kEdgeAxis, of_hull = edges / 3, k = edges % 3;
-    const PolyhedronEdge edge = hull.edge(of_hull);
-    const Vec3 a = hull.vertex(edge.a);
-    add(middle_of_edges(a, hull.vertex(edge.b) - a, pair.corner[k], pair.edge(k)), least.distance,
+    add(pair.edge_points(least).middle(), least.distance,
         0x80000000u + static_cast<std::uint32_t>(4 * of_hull + k));
     return;
   }

@@ -177,7 +177,9 @@ JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit, PolyhedronA
   if (!test_faces_of_b(pair, error, limit, &of_b)) return false;
   axes->widest = of_b.overlap.distance > of_a.overlap.distance ? of_b : of_a;
   if (!test_edges(pair, error, axes->widest.overlap.distance, limit, &edges)) return false;
-  axes->preferred = preferred(preferred(of_a, of_b), edges);
+  const PolyhedronAxis& face = preferred(of_a, of_b);
+  const bool is_face = &preferred_to_edges(face.overlap, edges.overlap) == &face.overlap;
+  axes->preferred = edges.kind == PolyhedronAxis::none || is_face ? face : edges;
   if (edges.kind != PolyhedronAxis::none &&
       edges.overlap.distance > axes->widest.overlap.distance) {
     axes->widest = edges;
@@ -185,15 +187,15 @@ JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit, PolyhedronA
   return true;
 }
 
-/// The midpoint between the closest points of two edges that are not parallel (Goldman 1990).
-JFPX_HD inline Vec3 middle_of_edges(const Vec3& a, const Vec3& along_a, const Vec3& b,
-                                    const Vec3& along_b) {
+/// The closest points of two edges that are not parallel (Goldman 1990).
+JFPX_HD inline EdgePoints closest_of_edges(const Vec3& a, const Vec3& along_a, const Vec3& b,
+                                           const Vec3& along_b) {
   const auto clamp = [](Real x) { return x > 1 ? Real(1) : x < 0 ? Real(0) : x; };
   const Vec3 common = cross(along_a, along_b);
   const Real scale = Real(1) / length_squared(common);
   const Real s = clamp(dot(cross(b - a, along_b), common) * scale);
   const Real t = clamp(dot(cross(b - a, along_a), common) * scale);
-  return (add_scaled(a, along_a, s) + add_scaled(b, along_b, t)) * Real(0.5);
+  return {add_scaled(a, along_a, s), add_scaled(b, along_b, t)};
 }
 
 /// Calls add(point, distance, feature) for the points of the contact, in the axes of a; the point
@@ -208,8 +210,9 @@ JFPX_HD void visit_contact_points(const PolyhedronPair<A, B>& pair, const Polyhe
     const auto first = static_cast<std::uint32_t>(axis.first);
     const auto second = static_cast<std::uint32_t>(axis.second);
     constexpr std::uint32_t kEdges = 0x80000000u, kMostEdges = 512;
-    add(middle_of_edges(pa, pair.a.vertex(ea.b) - pa, pb, pair.vertex_of_b(eb.b) - pb),
-        axis.overlap.distance, kEdges + first * kMostEdges + second);
+    const EdgePoints closest =
+        closest_of_edges(pa, pair.a.vertex(ea.b) - pa, pb, pair.vertex_of_b(eb.b) - pb);
+    add(closest.middle(), axis.overlap.distance, kEdges + first * kMostEdges + second);
     return;
   }
   // The normal of the reference face points to the other polyhedron.
@@ -242,19 +245,29 @@ JFPX_HD void visit_contact_points(const PolyhedronPair<A, B>& pair, const Polyhe
   }
 }
 
-/// The vertex that is deepest below a reference face.
+/// The vertex that is deepest below a reference face. Of vertices that are equally deep, that
+/// which is nearest to the centre of the other polyhedron.
 template <class A, class B, class Add>
 JFPX_HD void visit_deepest_vertex(const PolyhedronPair<A, B>& pair, const PolyhedronAxis& axis,
                                   const Add& add) {
   const bool is_of_a = axis.kind == PolyhedronAxis::face_of_a;
   const Vec3 n = is_of_a ? -axis.overlap.normal : axis.overlap.normal;
   const int count = is_of_a ? pair.b.vertex_count() : pair.a.vertex_count();
-  Vec3 lowest;
+  const auto vertex = [&](int i) { return is_of_a ? pair.vertex_of_b(i) : pair.a.vertex(i); };
   Real least = kMaxReal;
   for (int i = 0; i < count; ++i) {
-    const Vec3 p = is_of_a ? pair.vertex_of_b(i) : pair.a.vertex(i);
-    const Real height = dot(n, p);
-    if (height < least) least = height, lowest = p;
+    const Real height = dot(n, vertex(i));
+    if (height < least) least = height;
+  }
+  const Vec3 centre = is_of_a ? pair.a.centre() : pair.rotation * pair.b.centre() + pair.offset;
+  Vec3 lowest;
+  Real nearest = kMaxReal;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 p = vertex(i);
+    const Real distance = length_squared(p - centre);
+    if (!(dot(n, p) <= least + 2 * axis.overlap.error) || !(distance < nearest)) continue;
+    nearest = distance;
+    lowest = p;
   }
   add(add_scaled(lowest, n, axis.overlap.distance * Real(-0.5)), axis.overlap.distance,
       PointFeature::kCount - 1);

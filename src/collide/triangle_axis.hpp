@@ -2,6 +2,8 @@
 /// see mesh_triangle.hpp. A pair of a polyhedron and a triangle is a LocalTriangle with
 ///   - `kEdgeAxis`: number of the first axis that is the cross product of two edges;
 ///   - `lowest(axis)`: [m], least coordinate of the polyhedron along an axis;
+///   - `has_points(overlap)`: whether the axis of an overlap is that of two edges that cross, or no
+///     cross product of two edges;
 ///   - a function `for_each_axis(pair, visit)`.
 #pragma once
 
@@ -123,15 +125,17 @@ JFPX_HD LeastOverlap proximal_axis(const Pair& pair, const TriangleInstance& tri
     if (best->axis >= 0 && !(overlap.distance > best->distance)) return true;
     if (!(overlap.distance > normal.distance)) return true;
     if (are_parallel(overlap.normal, pair.normal)) return true;
-    if (best == &edges && faces.axis >= 0 && are_parallel(overlap.normal, faces.normal)) {
-      return true;
-    }
     const int feature = supporting_feature(pair.corner, overlap);
     if (feature == kFace) return true;
+    if (overlap.distance < 0 && !pair.has_points(overlap)) return true;
     if (triangle.is_proximal(feature, axes * overlap.normal)) *best = overlap;
     return true;
   });
-  return preferred(preferred(normal, faces), edges);
+  // If the best pair of edges has the normal of a face, the next pair is not tried: its edges do
+  // not cross, or the face has more of the contact.
+  const LeastOverlap& face = preferred(normal, faces);
+  const bool is_of_face = edges.axis >= 0 && are_parallel(edges.normal, face.normal);
+  return is_of_face ? face : preferred(face, edges);
 }
 
 /// Writes the axis of the contact. The widest axis may be no proximal normal: a neighbor is closer

@@ -35,6 +35,11 @@ struct Avx2Lanes {
   static Mask negate_mask(Mask m) { return _mm256_xor_pd(m, always()); }
   static Mask always() { return _mm256_castsi256_pd(_mm256_set1_epi32(-1)); }
   static Mask never() { return _mm256_setzero_pd(); }
+  static Mask mask_of(unsigned bits) {
+    const __m256i lane = _mm256_setr_epi64x(1, 2, 4, 8);
+    const __m256i of_lane = _mm256_and_si256(_mm256_set1_epi64x(static_cast<int>(bits)), lane);
+    return _mm256_castsi256_pd(_mm256_cmpeq_epi64(of_lane, lane));
+  }
   static bool any(Mask m) { return _mm256_movemask_pd(m) != 0; }
   static unsigned bits(Mask m) { return static_cast<unsigned>(_mm256_movemask_pd(m)); }
   static void transpose(const Vec* r, Vec* out) {
@@ -70,6 +75,11 @@ struct Avx2Lanes {
   static Mask negate_mask(Mask m) { return _mm256_xor_ps(m, always()); }
   static Mask always() { return _mm256_castsi256_ps(_mm256_set1_epi32(-1)); }
   static Mask never() { return _mm256_setzero_ps(); }
+  static Mask mask_of(unsigned bits) {
+    const __m256i lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    const __m256i of_lane = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(bits)), lane);
+    return _mm256_castsi256_ps(_mm256_cmpeq_epi32(of_lane, lane));
+  }
   static bool any(Mask m) { return _mm256_movemask_ps(m) != 0; }
   static unsigned bits(Mask m) { return static_cast<unsigned>(_mm256_movemask_ps(m)); }
   /// Transposes four vectors of x y z w, in each half, to one vector each of x, y, z and w.

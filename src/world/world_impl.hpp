@@ -120,7 +120,7 @@ struct World::Impl {
   /// The contacts of the last step, and of the step before, built on demand. If the device has the
   /// state, fetches the data first. Const functions may call it concurrently.
   /// @throws std::bad_alloc, DeviceError
-  const ContactList& contact_list();
+  JFPX_API const ContactList& contact_list();
   const ContactList& contact_list_before();
   /// Builds the contact lists of the last two steps. Called before a change of bodies, or a move of
   /// the state to or from the device, that would change their data.
@@ -241,11 +241,11 @@ struct World::Impl {
   void lose_device(const std::string& failure);
   static void fill_report(const DeviceWorld::Result& result, StepReport* report);
   void apply_forces_on_host();
-  static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
-  void start_detection();
+  JFPX_API static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
+  JFPX_API void start_detection();
   void find_contacts(StepReport* report);
-  void finish_detection(StepReport* report);
-  void call_generators(std::vector<Contact>* list, StepReport* report);
+  JFPX_API void finish_detection(StepReport* report);
+  JFPX_API void call_generators(std::vector<Contact>* list, StepReport* report);
   std::uint32_t count_awake() const;
   void save_for_undo();
   void undo_motion() noexcept;

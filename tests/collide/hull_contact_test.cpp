@@ -3,8 +3,8 @@
 #include <jfpx/collide.hpp>
 
 #include "src/world/bodies/sub_shape_view.hpp"
+#include "tests/collide/random_solids.hpp"
 #include "tests/collide/rounded_points.hpp"
-#include "tests/world/random_bodies.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,26 +12,10 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::contact_between;
 using test::core_gap;
+using test::partner;
 using test::RoundedPoints;
-
-SolidShape solid_of(std::uint64_t kind, Random* random) {
-  if (kind == 0) return Sphere{random->uniform(0.1_r, 0.8_r)};
-  if (kind == 1) return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.7_r, 0.7_r, 0.7_r})};
-  if (kind == 2) return Capsule{random->uniform(0.05_r, 0.5_r), random->uniform(0.05_r, 0.9_r)};
-  return test::random_hull(random);
-}
-
-detail::PairManifold contact_of(const SolidShape& a, const Transform& pose_a, const SolidShape& b,
-                                const Transform& pose_b, const detail::PairMotion& pair = {}) {
-  detail::PairManifold found;
-  const auto test = [&](const auto& x, const auto& y) {
-    detail::find_contact_of_any(detail::instance(x, pose_a), detail::instance(y, pose_b), pair,
-                                &found);
-  };
-  std::visit(test, a, b);
-  return found;
-}
 
 Real deepest(const detail::PairManifold& manifold) {
   Real distance = 0;
@@ -48,7 +32,7 @@ TEST(HullContact, HasTheDepthOfTheOracleWithEverySolid) {
   int touching[4] = {}, deep[4] = {}, missed = 0;
   for (int n = 0; n < 6000; ++n) {
     const auto kind = static_cast<std::uint64_t>(n % 4);
-    const SolidShape hull = test::random_hull(&random), other = solid_of(kind, &random);
+    const SolidShape hull = test::random_hull(&random), other = partner(kind, &random);
     const bool hull_first = random.below(2) == 0;
     const Transform at = make_transform(test::random_rotation(&random), {});
     const Transform pose = make_transform(test::random_rotation(&random),
@@ -56,8 +40,8 @@ TEST(HullContact, HasTheDepthOfTheOracleWithEverySolid) {
     RoundedPoints a(hull, at);
     const RoundedPoints b(other, pose);
     const double radius = a.radius + b.radius, core = core_gap(a, b), gap = core - radius;
-    const detail::PairManifold found =
-        hull_first ? contact_of(hull, at, other, pose) : contact_of(other, pose, hull, at);
+    const detail::PairManifold found = hull_first ? contact_between(hull, at, other, pose)
+                                                  : contact_between(other, pose, hull, at);
     const double tolerance = 2e-5;
     if (gap > tolerance) {
       ASSERT_EQ(found.touch_count, 0u) << n << ", gap " << gap;
@@ -100,11 +84,11 @@ TEST(HullContact, PointsAreInTheOverlap) {
   std::uint64_t points = 0;
   for (int n = 0; n < 3000; ++n) {
     const SolidShape a = test::random_hull(&random);
-    const SolidShape b = random.below(2) == 0 ? solid_of(1, &random) : solid_of(3, &random);
+    const SolidShape b = random.below(2) == 0 ? partner(1, &random) : partner(3, &random);
     const Transform at = make_transform(test::random_rotation(&random), {});
     const Transform pose = make_transform(test::random_rotation(&random),
                                           random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
-    const detail::PairManifold found = contact_of(a, at, b, pose);
+    const detail::PairManifold found = contact_between(a, at, b, pose);
     const RoundedPoints of_a(a, at), of_b(b, pose);
     for (std::uint32_t k = 0; k < found.touch_count; ++k) {
       RoundedPoints point(Sphere{1}, {{}, found.touches[k].point});
@@ -133,12 +117,12 @@ TEST(HullContact, AHullOfABoxHasTheContactsOfTheBox) {
     }
     const Hull hull(corners);
     ASSERT_EQ(hull.faces().size(), 6u);
-    const SolidShape other = solid_of(random.below(3), &random);
+    const SolidShape other = partner(random.below(3), &random);
     const Transform at = make_transform(test::random_rotation(&random), {});
     const Transform pose = make_transform(test::random_rotation(&random),
                                           random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
-    const detail::PairManifold found = contact_of(hull, at, other, pose),
-                               expected = contact_of(box, at, other, pose);
+    const detail::PairManifold found = contact_between(hull, at, other, pose),
+                               expected = contact_between(box, at, other, pose);
     const Real depth = deepest(expected);
     if (depth > -1e-4_r && depth < 0) continue;
     ASSERT_EQ(found.touch_count > 0, expected.touch_count > 0) << n;
@@ -172,7 +156,7 @@ TEST(HullContact, ALongHullTouchesTheGroundWithItsLowestVertex) {
     find_contact_with_triangle(detail::instance(hull, pose), ground, 0, {}, {}, &found);
     ASSERT_GT(found.touch_count, 0u) << n;
     ASSERT_NEAR(deepest(found), -0.005_r, 1e-4_r) << n;
-    const detail::PairManifold on_box = contact_of(hull, pose, floor, {{}, {0, -1, 0}});
+    const detail::PairManifold on_box = contact_between(hull, pose, floor, {{}, {0, -1, 0}});
     ASSERT_GT(on_box.touch_count, 0u) << n;
     ASSERT_NEAR(deepest(on_box), -0.005_r, 2e-4_r) << n;
   }

@@ -2,6 +2,7 @@
 /// against sphere tracing, mass and submerged volume against sums over small cells.
 #include <jfpx/collide.hpp>
 
+#include "tests/collide/random_solids.hpp"
 #include "tests/collide/support_oracle.hpp"
 #include "tests/world/meshes.hpp"
 #include "tests/world/random_bodies.hpp"
@@ -13,45 +14,16 @@
 namespace jfpx {
 namespace {
 
+using test::contact_between;
+using test::kPartners;
+using test::partner;
+using test::random_tilt;
+using test::round_solid;
 using test::operator""_r;
 using test::operator-;
 using test::Point;
 using test::SupportSolid;
 using test::to_point;
-
-SolidShape round_solid(Random* random) {
-  const Real radius = random->uniform(0.05_r, 0.8_r), half_height = random->uniform(0.05_r, 0.8_r);
-  if (random->below(2) == 0) return Cone{radius, half_height};
-  return Cylinder{radius, half_height};
-}
-constexpr int kPartners = 5;
-SolidShape partner(std::uint64_t kind, Random* random) {
-  if (kind == 0) return Sphere{random->uniform(0.1_r, 0.8_r)};
-  if (kind == 1) return Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.7_r, 0.7_r, 0.7_r})};
-  if (kind == 2) return Capsule{random->uniform(0.05_r, 0.5_r), random->uniform(0.05_r, 0.9_r)};
-  if (kind == 3) return test::random_hull(random);
-  return round_solid(random);
-}
-/// A random rotation, or one of an axis near an axis of the world.
-Quat random_tilt(Random* random) {
-  if (random->below(2) == 0) return test::random_rotation(random);
-  const Quat quarters[] = {{}, {1, 1, 0, 0}, {1, 0, 0, 1}};
-  const Quat q = normalized(quarters[random->below(3)]);
-  const Real angle = random->below(3) == 0 ? Real(0) : random->uniform(0, 0.08_r);
-  return normalized(add_scaled(q, test::random_direction(random), angle));
-}
-
-detail::PairManifold contact_between(const SolidShape& a, const Transform& pose_a,
-                                     const SolidShape& b, const Transform& pose_b,
-                                     const detail::PairMotion& pair = {}) {
-  detail::PairManifold found;
-  const auto test = [&](const auto& x, const auto& y) {
-    detail::find_contact_of_any(detail::instance(x, pose_a), detail::instance(y, pose_b), pair,
-                                &found);
-  };
-  std::visit(test, a, b);
-  return found;
-}
 
 TEST(RoundContact, HasTheSeparationOfTheOracleWithEverySolid) {
   const std::uint64_t seed = test::fresh_seed();
@@ -119,42 +91,6 @@ TEST(RoundContact, SolidsWithTheSameAxisAreParted) {
       }
     }
   }
-}
-
-/// Each point is in the middle of the overlap: within half the depth of both solids, seen along
-/// many directions. A point of two nearly parallel lines may be beside one of them; one point in
-/// 10,000 is farther away.
-TEST(RoundContact, PointsAreInTheOverlap) {
-  const std::uint64_t seed = test::fresh_seed();
-  SCOPED_TRACE(test::trace(seed));
-  Random random(seed);
-  int points = 0, beside = 0;
-  for (int n = 0; n < 3000; ++n) {
-    const auto kind = static_cast<std::uint64_t>(n % kPartners);
-    const SolidShape a = round_solid(&random), b = partner(kind, &random);
-    const Transform pose_a = make_transform(random_tilt(&random), {});
-    const Transform pose_b =
-        make_transform(random_tilt(&random), random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
-    const SupportSolid of_a(a, pose_a), of_b(b, pose_b);
-    const detail::PairManifold found = contact_between(a, pose_a, b, pose_b);
-    for (std::uint32_t k = 0; k < found.touch_count; ++k) {
-      const Point p = to_point(found.touches[k].point);
-      const double depth = -static_cast<double>(found.touches[k].distance);
-      if (depth > 0.1) continue;
-      bool is_beside = false;
-      for (int i = 0; i < 200; ++i) {
-        const Point d = to_point(test::random_direction(&random));
-        const double outside =
-            test::dot(p, d) - std::min(of_a.reach(d), of_b.reach(d)) - 0.52 * depth;
-        is_beside = is_beside || outside > 0.05;
-        EXPECT_LT(outside, 0.3) << n << ' ' << kind;
-      }
-      beside += is_beside ? 1 : 0;
-      ++points;
-    }
-  }
-  EXPECT_LE(beside, 3);
-  EXPECT_GT(points, 300);
 }
 
 TEST(RoundContact, HasTheDepthOfAHalfSpace) {

@@ -50,5 +50,51 @@ TEST(RowTable, DividesRowsIntoCellsInOrder) {
   }
 }
 
+/// Aligned groups of rows belong to one cell, to one crossing color, or to one part of fixed rows,
+/// and threads that divide a color do not share them.
+TEST(RowTable, AlignsInnerCellsColorsFixedPartsAndTheOverflow) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<std::uint32_t> small(0, 20), few(0, 3);
+  constexpr std::uint32_t kAlignment = 8;
+  RowTable table;
+  for (int round = 0; round < 50; ++round) {
+    const RowTable::Shape shape{1 + few(random), few(random), few(random), few(random)};
+    table.start(shape, kAlignment);
+    std::vector<std::uint32_t> sizes;
+    for (std::size_t cell = 0; cell <= table.overflow(); ++cell) {
+      sizes.push_back(small(random));
+      table.set_size(cell, sizes.back());
+    }
+    table.scan();
+    std::uint32_t end = 0;
+    for (std::size_t cell = 0; cell < sizes.size(); ++cell) {
+      ASSERT_EQ(table.end(cell) - table.begin(cell), sizes[cell]);
+      const bool is_first_of_color = shape.crossing_colors > 0 && cell >= table.crossing(0, 0) &&
+                                     (cell - table.crossing(0, 0)) % shape.parts == 0;
+      const bool is_crossing = cell >= shape.parts * shape.inner_colors && cell < table.fixed(0);
+      if (is_crossing && !is_first_of_color) {
+        ASSERT_EQ(table.begin(cell), end);
+      } else {
+        ASSERT_EQ(table.begin(cell) % kAlignment, 0u);
+        ASSERT_LT(table.begin(cell) - end, kAlignment);
+      }
+      end = table.end(cell);
+    }
+    ASSERT_EQ(table.size() % kAlignment, 0u);
+    ASSERT_LT(table.size() - end, kAlignment);
+    for (std::size_t c = 0; c < shape.crossing_colors; ++c) {
+      ASSERT_EQ(table.crossing_boundary(0, c), table.begin(table.crossing(0, c)));
+      const std::uint32_t last = table.end(table.crossing(shape.parts - 1, c));
+      ASSERT_EQ(table.crossing_boundary(shape.parts, c), last);
+      for (std::size_t part = 1; part < shape.parts; ++part) {
+        const std::uint32_t boundary = table.crossing_boundary(part, c);
+        ASSERT_GE(boundary, table.crossing_boundary(part - 1, c));
+        ASSERT_TRUE(boundary % kAlignment == 0 || boundary == last);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace jfpx

@@ -12,6 +12,7 @@
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
 #include "tests/world/several_blocks.hpp"
+#include "tests/world/tiles.hpp"
 
 #include <gtest/gtest.h>
 
@@ -209,6 +210,35 @@ TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
   }
   EXPECT_GT(contacts, 1000u);
   EXPECT_TRUE(WorldAccess::impl(device).resident());
+}
+
+/// Bodies whose contacts at seams are hidden, on boxes, hulls and parts of compounds.
+TEST_P(DeviceWorldTest, BodiesOnFlushTilesHaveTheBitsOfTheProcessor) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  for (const auto tiles : {test::Tiles::boxes, test::Tiles::hulls, test::Tiles::parts}) {
+    SCOPED_TRACE(test::name_of(tiles));
+    Scene scene;
+    scene.bodies = test::tiled_floor(tiles, 12, 0.3_r);
+    for (int i = 0; i < 80; ++i) {
+      BodyDef def = test::random_body(&random, 4);
+      if (!test::has_volume(def.shape)) def.shape = Sphere{0.3_r};
+      def.mass = 1;
+      def.position.y = random.uniform(0.3_r, 1.5_r);
+      def.velocity = random.uniform_in_box({-4, 0, -4}, {4, 0, 4});
+      def.acceleration = {0, -9.81_r, 0};
+      scene.bodies.push_back(def);
+    }
+    World host = on_host(scene), device = on_device(scene);
+    for (int n = 0; n < scene_steps(60); ++n) {
+      const StepReport a = host.step(), b = device.step();
+      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+    }
+    ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+    EXPECT_TRUE(WorldAccess::impl(device).resident());
+  }
 }
 
 TEST_P(DeviceWorldTest, FastBodiesInRoomsHaveTheBitsOfTheProcessor) {

@@ -29,6 +29,7 @@ class Search {
     table_.update_poses(*store_);
     margins_.resize(table_.ranges().bounded());
     swept_.resize(table_.ranges().bounded());
+    boxes_.resize(table_.ranges().fixed_begin());
     motion_.resize(store_->capacity());
     for (std::uint32_t i = 0; i < store_->capacity(); ++i) {
       motion_[i] = store_->view().predicted_motion(i);
@@ -38,6 +39,7 @@ class Search {
                .motion = motion_.data(),
                .margins = margins_.data(),
                .swept = swept_.data(),
+               .boxes = boxes_.data(),
                .largest_margin = 0.01_r};
     for (std::uint32_t i = 0; i < table_.ranges().bounded(); ++i) bounds_.sweep(i);
     is_new_ ? trees_.set_bodies(table_, bounds_) : trees_.move_kinematic(bounds_);
@@ -57,7 +59,10 @@ class Search {
     SubShapes list;
     const std::uint32_t body = bounds_.sub_shapes.body(i);
     for (std::uint32_t fixed = size(); fixed < table_.ranges().all(); ++fixed) {
-      if (store_->may_collide(body, bounds_.sub_shapes.body(fixed)) && bounds_.may_meet(i, fixed)) {
+      const bool near = bounds_.sub_shapes.is_wall(fixed) ||
+                        overlap(bounds_.tree_bounds(fixed), bounds_.query_bounds(i));
+      if (near && store_->may_collide(body, bounds_.sub_shapes.body(fixed)) &&
+          bounds_.may_meet(i, fixed)) {
         list.push_back(fixed);
       }
     }
@@ -70,6 +75,7 @@ class Search {
   FixedTrees trees_;
   std::vector<Real> margins_;
   std::vector<SphereInstance> swept_;
+  std::vector<Aabb> boxes_;
   std::vector<Vec3> motion_;
   SweptBounds bounds_;
   bool is_new_ = true;

@@ -3,8 +3,10 @@ jfpx_add_test(world_parts_test THESIS INTERNAL SOURCES
   world/body_store_test.cpp
   world/compound_test.cpp
   world/fixed_trees_test.cpp
+  world/gyroscopic_test.cpp
   world/neighbor_list_test.cpp
-  world/query_tree_test.cpp)
+  world/query_tree_test.cpp
+  world/swept_bounds_test.cpp)
 jfpx_add_test(device_world_test THESIS INTERNAL SOURCES world/device_world_test.cpp)
 if(JFPX_HAS_CUDA)
   set(cuda_runtime CUDA::cudart_static)
@@ -66,6 +68,7 @@ jfpx_add_test(quality_test THESIS SOURCES
   world/hull_world_test.cpp
   world/impact_test.cpp
   world/oracle_test.cpp
+  world/seams_test.cpp
   world/stack_test.cpp)
 jfpx_add_test(concurrency_test THESIS SOURCES world/concurrency_test.cpp)
 jfpx_add_test(soak_test THESIS SOURCES world/soak_test.cpp)

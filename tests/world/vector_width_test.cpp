@@ -22,7 +22,13 @@ Scene random_bodies(Random* random, bool any_boxes) {
     }
     def.mass = random->below(30) == 0 ? 0 : random->uniform(0.1_r, 10);
     def.friction = random->below(3) == 0 ? 0 : random->uniform(0, 1);
-    if (def.mass > 0) def.velocity = random->uniform_in_box({-6, -6, -6}, {6, 6, 6});
+    if (def.mass > 0) {
+      // Slow and fast rotations have different methods for their gyroscopic terms.
+      const Real spin = random->below(2) == 0 ? 0.5_r : 12;
+      def.velocity = random->uniform_in_box({-6, -6, -6}, {6, 6, 6});
+      def.angular_velocity = random->uniform_in_box({-spin, -spin, -spin}, {spin, spin, spin});
+      def.angular_damping = random->below(2) == 0 ? 1 : random->uniform(0.5_r, 1);
+    }
     if (rebounds) def.restitution = random->uniform(0, 1);
     if (rolls && random->below(2) == 0) def.rolling_friction = 0.02_r;
     scene.bodies.push_back(def);
@@ -52,7 +58,13 @@ TEST(VectorWidths, HaveEqualSnapshotsOfRandomBodies) {
     const Scene scene = random_bodies(&random, k % 2 == 1);
     World scalar(scene, {.collider = {.backend = Backend::cpu, .simd = SimdLevel::scalar}});
     World vectors(scene, {.collider = {.backend = Backend::cpu, .simd = SimdLevel::automatic}});
+    const std::span<const BodyId> ids = scalar.bodies();
     for (int n = 0; n < 25; ++n) {
+      const BodyId pushed = ids[random.below(ids.size())];
+      for (World* world : {&scalar, &vectors}) {
+        world->apply_force(pushed, {1, 2, 3});
+        world->apply_torque(pushed, {0.1_r, 0.2_r, 0.3_r});
+      }
       scalar.step();
       vectors.step();
       ASSERT_EQ(scalar.snapshot(), vectors.snapshot()) << "scene " << k << ", step " << n;

@@ -212,6 +212,61 @@ JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3
   return best;
 }
 
+/// The point of a that is closest to b when the solids are parted by a clear gap along the axis of
+/// least overlap, in the axes of a.
+/// @param normal     unit, from b to a
+/// @param separation [m], of the axis
+template <class Pair>
+JFPX_HD Vec3 closest_point_of_a(const Pair& pair, const Vec3& normal, Real separation) {
+  constexpr int kMost = 32;
+  const Real clear = pair.clear_gap();
+  const Vec3 shift = separation < clear ? normal * (clear - separation) : Vec3{};
+  Simplex simplex;
+  // The points of the simplex, and those of a that they are differences of.
+  Vec3 lowest[4], on_a[4] = {support_point(pair.a, -normal)}, n = normal;
+  int size = 0;
+  Real distance = kMaxReal;
+  for (int i = 0; i < kMost; ++i) {
+    const Vec3 p = pair.lowest_difference(n) + shift;
+    if (distance - dot(n, p) <= pair.error() || simplex.contains(p)) break;
+    Simplex next = simplex;
+    next.add(p);
+    const Real closest = length(next.closest);
+    if (!(closest < distance) || !(closest > 0)) break;
+    lowest[size] = p;
+    on_a[size++] = support_point(pair.a, -n);
+    int kept = 0;
+    for (int k = 0; k < size; ++k) {
+      if (next.contains(lowest[k])) lowest[kept] = lowest[k], on_a[kept++] = on_a[k];
+    }
+    size = kept;
+    simplex = next;
+    distance = closest;
+    n = simplex.closest * (Real(1) / closest);
+  }
+  // The weights of the closest point are as the parts of the segment, or of the triangle.
+  Real weight[3] = {1, 0, 0};
+  if (size == 2) {
+    weight[0] = length(simplex.closest - lowest[1]);
+    weight[1] = length(simplex.closest - lowest[0]);
+  } else if (size == 3) {
+    const Vec3 across = cross(lowest[1] - lowest[0], lowest[2] - lowest[0]);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 q = lowest[(k + 1) % 3] - simplex.closest;
+      const Real part = dot(across, cross(q, lowest[(k + 2) % 3] - simplex.closest));
+      weight[k] = part > 0 ? part : Real(0);
+    }
+  }
+  const Real sum = weight[0] + weight[1] + weight[2];
+  if (!(sum > 0)) return on_a[0];  // a triangle so thin that its areas are 0
+  const Real scale = Real(1) / sum;
+  Vec3 result = on_a[0];
+  for (int k = 1; k < size; ++k) {
+    result = add_scaled(result, on_a[k] - on_a[0], weight[k] * scale);
+  }
+  return result;
+}
+
 /// Replaces an axis by one of larger separation, if there is one near it.
 /// @param normal     unit, from b to a
 /// @param separation [m], of the axis

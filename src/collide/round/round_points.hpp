@@ -38,9 +38,10 @@ JFPX_HD inline Vec3 cap_corner(const Frustum& frustum, int cap, int k) {
 /// A line on the surface of a solid, or a point if both ends are equal.
 struct SupportingLine {
   Vec3 from, to;         ///< [m]
-  bool is_disc = false;  ///< the point is the middle of a cap that is hardly tilted
+  Real disc_radius = 0;  ///< [m]; not 0: the point is the middle of a cap that is hardly tilted
 
   JFPX_HD bool is_point() const { return from == to; }
+  JFPX_HD bool is_disc() const { return disc_radius > 0; }
 };
 
 /// Directions within 1.7 degrees of a right angle to a line are normals of the line.
@@ -53,10 +54,10 @@ JFPX_HD inline SupportingLine supporting_line(const Frustum& f, const Vec3& dire
   const Real slope = f.side_cosine * direction.y - f.side_sine * radial.distance;
   if (!(absolute(slope) <= kLineSine)) {
     const bool is_upper = f.is_upper_farthest(radial.distance, direction.y);
-    const bool is_disc =
-        radial.distance <= kLineSine && (is_upper ? f.upper_radius : f.lower_radius) > 0;
+    const Real radius = is_upper ? f.upper_radius : f.lower_radius;
+    const bool is_disc = radial.distance <= kLineSine && radius > 0;
     const Vec3 p = f.rim_point(is_upper, is_disc ? Vec3{} : radial.direction);
-    return {p, p, is_disc};
+    return {p, p, is_disc ? radius : Real(0)};
   }
   return {f.rim_point(false, radial.direction), f.rim_point(true, radial.direction)};
 }
@@ -275,7 +276,9 @@ JFPX_HD inline Vec3 closest_of_line(const SupportingLine& line, const Vec3& p) {
 }
 
 /// The points of an axis that is not the normal of a face: where two lines are closest, or two
-/// points on lines that are nearly parallel.
+/// points on lines that are nearly parallel. Where the lines are not opposite to each other along
+/// the axis, the closest points of the solids: a face that is hardly tilted has several supporting
+/// edges, and a long line that is hardly tilted leaves the other solid.
 /// @param normal   unit, from b to a, in the axes of a
 /// @param distance [m], along the axis
 /// @param add      receives point on a, height above b, feature
@@ -284,44 +287,64 @@ JFPX_HD void visit_line_pair(const ConvexPair<A, B>& pair, const Vec3& normal, R
                              const Add& add) {
   const SupportingLine a = supporting_line(pair.a, -normal);
   const SupportingLine local = supporting_line(pair.b, transform_transpose(pair.rotation, normal));
-  const SupportingLine b{pair.place(local.from), pair.place(local.to)};
+  const SupportingLine b{pair.place(local.from), pair.place(local.to), local.disc_radius};
+  const auto across = [&](const Vec3& on_a, const Vec3& on_b) {
+    const Vec3 offset = on_a - on_b;
+    return add_scaled(offset, normal, -dot(normal, offset));
+  };
   const auto add_single = [&](const Vec3& on_a) { add(on_a, distance, kRimPoint); };
+  // A point of a, if it is opposite to a point of b up to a distance across the axis.
+  const auto add_opposite = [&](const Vec3& on_a, const Vec3& from, const Vec3& to, Real most) {
+    const bool is_opposite = length_squared(across(from, to)) <= most * most;
+    add_single(is_opposite ? on_a : closest_point_of_a(pair, normal, distance));
+  };
+  const Real gap = pair.clear_gap();
   // Where a cap is hardly tilted, the direction of its deepest point is noise.
-  if (a.is_disc && local.is_disc) {
-    const Vec3 across = b.from - a.from;
-    return add_single(
-        add_scaled(a.from, add_scaled(across, normal, -dot(normal, across)), Real(0.5)));
+  if (a.is_disc() && b.is_disc()) {
+    const Real radius = a.disc_radius < b.disc_radius ? a.disc_radius : b.disc_radius;
+    const Vec3 middle = add_scaled(a.from, across(b.from, a.from), Real(0.5));
+    return add_opposite(middle, a.from, b.from, 2 * radius);
   }
-  if (a.is_disc) {
-    return add_single(add_scaled(closest_of_line(b, a.from), normal, distance));
+  if (a.is_disc()) {
+    const Vec3 on_b = closest_of_line(b, a.from);
+    return add_opposite(add_scaled(on_b, normal, distance), a.from, on_b, a.disc_radius);
   }
-  if (local.is_disc) return add_single(closest_of_line(a, b.from));
-  if (a.is_point()) return add_single(a.from);
-  if (local.is_point()) return add_single(add_scaled(b.from, normal, distance));
+  if (b.is_disc()) {
+    const Vec3 on_a = closest_of_line(a, b.from);
+    return add_opposite(on_a, on_a, b.from, b.disc_radius);
+  }
+  if (a.is_point()) return add_opposite(a.from, a.from, closest_of_line(b, a.from), gap);
+  if (b.is_point()) {
+    const Vec3 on_a = add_scaled(b.from, normal, distance);
+    return add_opposite(on_a, closest_of_line(a, on_a), b.from, gap);
+  }
   const Vec3 along_a = a.to - a.from, along_b = b.to - b.from, common = cross(along_a, along_b);
   const Real sizes = length_squared(along_a) * length_squared(along_b);
   if (length_squared(common) > kLineSine * kLineSine * sizes) {
     const Segment first = segment_between(a.from, a.to), second = segment_between(b.from, b.to);
     const ClosestPoints t = closest_points(first, second);
-    const Vec3 middle = (first.point(t.a) + second.point(t.b)) * Real(0.5);
-    return add_single(add_scaled(middle, normal, distance * Real(0.5)));
+    const Vec3 on_a = first.point(t.a), on_b = second.point(t.b);
+    const Vec3 middle = (on_a + on_b) * Real(0.5);
+    return add_opposite(add_scaled(middle, normal, distance * Real(0.5)), on_a, on_b, gap);
   }
   // The common part of both lines, as parameters of a.
   const Real scale = Real(1) / length_squared(along_a);
   const Real p = dot(along_a, b.from - a.from) * scale, q = dot(along_a, b.to - a.from) * scale;
   const Real lower = p < q ? p : q, upper = p < q ? q : p;
   const Real start = lower > 0 ? lower : Real(0), end = upper < 1 ? upper : Real(1);
-  const auto add_at = [&](Real t, std::uint32_t feature) {
-    const Vec3 on_a = add_scaled(a.from, along_a, t);
-    const Vec3 on_b = add_scaled(b.from, along_b, (t - p) / (q - p));
-    add(on_a, dot(normal, on_a - on_b), feature);
-  };
+  const auto on_a = [&](Real t) { return add_scaled(a.from, along_a, t); };
+  const auto on_b = [&](Real t) { return add_scaled(b.from, along_b, (t - p) / (q - p)); };
   if (!(start < end)) {
-    const Real t = start > 1 ? Real(1) : end < 0 ? Real(0) : start;
-    return add_single(add_scaled(a.from, along_a, t));
+    const Vec3 nearest = on_a(start > 1 ? Real(1) : end < 0 ? Real(0) : start);
+    return add_opposite(nearest, nearest, closest_of_line(b, nearest), gap);
   }
-  add_at(start, kLineStart);
-  add_at(end, kLineEnd);
+  const Vec3 starts[2] = {on_a(start), on_b(start)}, ends[2] = {on_a(end), on_b(end)};
+  if (length_squared(across(starts[0], starts[1])) > gap * gap ||
+      length_squared(across(ends[0], ends[1])) > gap * gap) {
+    return add_single(closest_point_of_a(pair, normal, distance));
+  }
+  add(starts[0], dot(normal, starts[0] - starts[1]), kLineStart);
+  add(ends[0], dot(normal, ends[0] - ends[1]), kLineEnd);
 }
 
 /// The points of a contact. add() receives a point in the middle of the overlap in the axes of a,

@@ -182,7 +182,7 @@ JFPX_HD inline void find_contact(const Posed<Box>& a, const Posed<Box>& b, const
   const auto separation_at = [&](Real part) -> Separation {
     pose.origin = moved(a.pose.origin, pair, part);
     boxes = make_box_pair(a.shape, pose, b.shape, b.pose);
-    if (!least_overlap(boxes, pair.limit, &least)) return {{}, 0, false};
+    if (!least_overlap(boxes, pair.limit, true, &least)) return {{}, 0, false};
     return {a.pose.basis * least.normal, least.distance};
   };
   if (!advance(pair, separation_at, &t)) return;

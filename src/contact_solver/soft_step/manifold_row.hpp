@@ -129,6 +129,9 @@ JFPX_HD constexpr Real linear_response(const BodyPair& pair) {
   return kFixed ? pair.a->inverse_mass : pair.a->inverse_mass + pair.b->inverse_mass;
 }
 
+/// Determinant of a regular matrix of two tangents, divided by the product of its diagonal.
+inline constexpr Real kLeastDeterminant = 8 * kEpsilon;
+
 /// Effective masses of friction. The levers must be set.
 template <bool kFixed>
 JFPX_HD inline void set_friction_masses(ManifoldRow* row, const BodyPair& pair) {
@@ -140,7 +143,7 @@ JFPX_HD inline void set_friction_masses(ManifoldRow* row, const BodyPair& pair) 
   row->slip_mass = 1 / highest;
   const Real determinant = xx * yy - xy * xy;
   // The matrix is positive definite; rounding may make it singular for extreme ratios of mass.
-  if (determinant > 8 * kEpsilon * xx * yy) {
+  if (determinant > kLeastDeterminant * xx * yy) {
     const Real k = 1 / determinant;
     row->xx = yy * k, row->yy = xx * k, row->xy = -xy * k;
   } else {

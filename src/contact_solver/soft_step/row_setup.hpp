@@ -40,6 +40,9 @@ struct BodyProperties {
   const Quat* start_orientation = nullptr;  ///< at the start of the step
 };
 
+/// Least weight of a point in the centre of friction of its contact.
+inline constexpr Real kLeastWeight = Real(1e-6);
+
 /// Builds rows of contacts and joints. Body a of a row is movable. Contacts and joints are numbered
 /// together: first the contacts, then the slots of joints.
 struct RowSetup {
@@ -164,18 +167,15 @@ struct RowSetup {
     row->restitution = combined(properties.rules.restitution, a.restitution, b.restitution);
   }
 
-  template <bool kFixed>
-  JFPX_HD void fill(ManifoldRow* row, PointRow* points, std::uint32_t contact) const {
+  /// Writes the members of a row that are independent of its points. @returns the restitution
+  JFPX_HD Real set_properties(ManifoldRow* row, std::uint32_t contact) const {
     const ContactKey& key = contacts.key(contact);
     const bool flipped = is_flipped(key);
     const Vec3& normal = contacts.normal(contact);
     row->a = flipped ? key.b : key.a;
     row->b = flipped ? key.a : key.b;
     row->count = contacts.impulse_count(contact);
-    const detail::ContactBasis basis = detail::contact_basis(flipped ? -normal : normal);
-    row->normal = basis.normal;
-    row->tangent = basis.tangent;
-    row->bitangent = basis.bitangent;
+    row->normal = flipped ? -normal : normal;
     Real restitution = 0;
     if (key.is_generated()) {
       row->friction = contacts.manifold(contact).friction;
@@ -195,6 +195,15 @@ struct RowSetup {
     const Vec3 rolling =
         rolls && contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
     row->rolling_impulse = flipped ? -rolling : rolling;
+    return restitution;
+  }
+  template <bool kFixed>
+  JFPX_HD void fill(ManifoldRow* row, PointRow* points, std::uint32_t contact) const {
+    const Real restitution = set_properties(row, contact);
+    const bool flipped = is_flipped(contacts.key(contact));
+    const detail::ContactBasis basis = detail::contact_basis(row->normal);
+    row->tangent = basis.tangent;
+    row->bitangent = basis.bitangent;
     SolverBody a = start[row->a], b = start[row->b];
     const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
                         &properties.inverse_inertia[row->b]};
@@ -229,6 +238,32 @@ struct RowSetup {
     set_lever<kFixed>(pair, centre_a, centre_b, row->tangent, &row->x);
     set_lever<kFixed>(pair, centre_a, centre_b, row->bitangent, &row->y);
     set_friction_masses<kFixed>(row, pair);
+  }
+
+  /// Starts a row that cpu::ManifoldSweepKernels::complete() completes: writes all but the levers,
+  /// the masses and the sums over points. Until then, the points have the arms as `turn_a` and
+  /// `turn_b`, and the friction impulse of the last step as `spin_a`; `twist_arm` is 1 if the
+  /// contact is that of two spheres.
+  void start_row(ManifoldRow* row, PointRow* points, std::uint32_t contact) const {
+    const Real restitution = set_properties(row, contact);
+    const bool flipped = is_flipped(contacts.key(contact));
+    const ContactPoints from(*this, *row, contact);
+    row->twist_arm = contacts.is_sphere(contact) ? Real(1) : Real(0);
+    SolverBody a, b;
+    if (restitution > 0) a = start[row->a], b = start[row->b];
+    const BodyPair pair{&a, &b, nullptr, nullptr};
+    const KeptImpulse* const kept = contacts.impulses + contacts.first_impulse(contact);
+    for (std::uint32_t i = 0; i < row->count; ++i) {
+      PointRow& p = points[i];
+      const PointArms arms = from.arms(i);
+      p.turn_a = arms.a;
+      p.turn_b = arms.b;
+      p.distance = from.distance(i);
+      p.normal_impulse = kept[i].normal;
+      p.spin_a = flipped ? -kept[i].friction : kept[i].friction;
+      p.rebound = -rebound_speed(relative_velocity(pair, arms.a, arms.b), row->normal, p.distance,
+                                 row->a, row->b, restitution);
+    }
   }
 
   template <bool kFixed>
@@ -346,19 +381,16 @@ struct RowSetup {
   struct PointArms {
     Vec3 a, b;  ///< [m], from the centres of mass of the bodies of the row
   };
-  /// Points of a contact in the row of a manifold, and their weights in its centre of friction.
-  struct FrictionPoints {
+  /// Points of a contact in the row of a manifold.
+  struct ContactPoints {
     const PointInput* points;  ///< null for a contact of two spheres
     bool is_flipped;
     PointArms of_sphere;
     Real distance_of_sphere = 0;
-    Real inverse_gap, scale = 1;
 
-    /// @param row its normal and number of points are set
-    JFPX_HD FrictionPoints(const RowSetup& setup, const ManifoldRow& row, std::uint32_t contact)
-        : points(nullptr),
-          is_flipped(setup.is_flipped(setup.contacts.key(contact))),
-          inverse_gap(setup.inverse_friction_gap) {
+    /// @param row its normal is set
+    JFPX_HD ContactPoints(const RowSetup& setup, const ManifoldRow& row, std::uint32_t contact)
+        : points(nullptr), is_flipped(setup.is_flipped(setup.contacts.key(contact))) {
       if (setup.contacts.is_sphere(contact)) {
         distance_of_sphere = setup.contacts.distance(contact, 0);
         const Real half_overlap = distance_of_sphere < 0 ? distance_of_sphere * Real(0.5) : Real(0);
@@ -369,9 +401,6 @@ struct RowSetup {
         return;
       }
       points = setup.contacts.points + setup.contacts.manifold(contact).first;
-      Real sum = 0;
-      for (std::uint32_t i = 0; i < row.count; ++i) sum += weight(i);
-      scale = 1 / sum;
     }
     JFPX_HD Real distance(std::uint32_t i) const {
       return points == nullptr ? distance_of_sphere : points[i].distance;
@@ -382,6 +411,19 @@ struct RowSetup {
       if (is_flipped) return {point.arm_b, point.arm_a};
       return {point.arm_a, point.arm_b};
     }
+  };
+  /// The points with their weights in the centre of friction of the contact.
+  struct FrictionPoints : ContactPoints {
+    Real inverse_gap, scale = 1;
+
+    /// @param row its normal and number of points are set
+    JFPX_HD FrictionPoints(const RowSetup& setup, const ManifoldRow& row, std::uint32_t contact)
+        : ContactPoints(setup, row, contact), inverse_gap(setup.inverse_friction_gap) {
+      if (this->points == nullptr) return;
+      Real sum = 0;
+      for (std::uint32_t i = 0; i < row.count; ++i) sum += weight(i);
+      scale = 1 / sum;
+    }
     /// Share of a point, which changes continuously when it opens or closes a gap.
     JFPX_HD Real share(std::uint32_t i) const {
       return points == nullptr ? Real(1) : weight(i) * scale;
@@ -389,9 +431,8 @@ struct RowSetup {
 
    private:
     JFPX_HD Real weight(std::uint32_t i) const {
-      constexpr Real kLeast = Real(1e-6);
       const Real weight = 1 - points[i].distance * inverse_gap;
-      return weight > 1 ? Real(1) : weight > kLeast ? weight : kLeast;
+      return weight > 1 ? Real(1) : weight > kLeastWeight ? weight : kLeastWeight;
     }
   };
   /// kind_of() for joints.

@@ -104,7 +104,8 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
     const Mat3 axes = to_matrix(orientation_now);
     Vec3 change;
     const Vec3 local = transform_transpose(axes, *w);
-    if (detail::momentum_keeping_change(local, tensor[i], substep, &change)) {
+    if (detail::momentum_keeping_change(local, tensor[i], body_inverse_inertia[i], substep,
+                                        &change)) {
       *w += axes * change;
     }
   }

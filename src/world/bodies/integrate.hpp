@@ -40,40 +40,74 @@ JFPX_HD inline bool gyroscopic_change(const Vec3& w, const Mat3& inertia, Real d
   return true;
 }
 
+/// The equation of momentum_keeping_change().
+struct MomentumEquation {
+  const Mat3& inertia;
+  Real half, quarter2;  ///< dt / 2, dt^2 / 4
+
+  /// The part that is quadratic in an angular velocity. @param side 1: after the step; -1: before
+  JFPX_HD Vec3 quadratic(const Vec3& w, const Vec3& momentum, Real side) const {
+    return w * (dot(w, momentum) * quarter2) + cross(w, momentum) * (half * side);
+  }
+  JFPX_HD Mat3 slope(const Vec3& w, const Vec3& momentum) const {
+    Mat3 slope =
+        inertia + (skew_symmetric(w) * inertia + skew_symmetric(momentum) * Real(-1)) * half;
+    const Real twice_energy = dot(w, momentum);
+    for (int k = 0; k < 3; ++k) {
+      slope.row[k] += momentum * (2 * quarter2 * w[k]);
+      slope.row[k][k] += twice_energy * quarter2;
+    }
+    return slope;
+  }
+};
+
+/// Limits of the rate of convergence of the fixed-point iterations below, squared: up to the first
+/// one, two iterations converge to rounding; up to the second one, three.
+inline constexpr Real kSlowerRotation = Real(3e-5), kSlowRotation = Real(3e-4);
+
 /// Change of the angular velocity between two steps of a rotation without torque, in body axes.
 /// With integrated_orientation(), which rotates by a Cayley map, the angular momentum is constant
 /// and the energy oscillates without a drift: the variational integrator of Bou-Rabee and Marsden
-/// (Hamilton-Pontryagin Integrators on Lie Groups, 2009). Newton's method starts with the angular
-/// velocity of the last step; the number of iterations depends on the rotation in a step.
-/// Up to 0.3 rad in a step, it converges to rounding; at 1 rad, errors are some per cent.
+/// (Hamilton-Pontryagin Integrators on Lie Groups, 2009). Iterations start with the angular
+/// velocity of the last step, and their number depends on the rotation in a step: fixed-point
+/// iterations of a slow rotation, and Newton's method. Up to 0.3 rad in a step, they converge to
+/// rounding; at 1 rad, errors are some per cent.
 /// @param w       [rad/s], angular velocity of the last step, in body axes
 /// @param inertia in body axes, up to a common factor
+/// @param inverse of the inertia, up to a common factor
 /// @param change  receives the change
 /// @returns false if rounding has made the equation singular
-JFPX_HD inline bool momentum_keeping_change(const Vec3& w, const Mat3& inertia, Real dt,
-                                            Vec3* change) {
-  // With one, two or three iterations, the error of a slow rotation is below (w dt)^3, ^7 or ^15.
-  constexpr Real kSlow = Real(1e-5), kFast = Real(1e-2), kVeryFast = Real(0.04);
+JFPX_HD inline bool momentum_keeping_change(const Vec3& w, const Mat3& inertia, const Mat3& inverse,
+                                            Real dt, Vec3* change) {
   const Real turned2 = length_squared(w) * dt * dt;
-  const int iterations = turned2 > kVeryFast ? 8 : turned2 > kFast ? 3 : turned2 > kSlow ? 2 : 1;
-  const Real half = dt * Real(0.5), quarter2 = half * half;
+  const Real half = dt * Real(0.5);
+  const MomentumEquation equation{inertia, half, half * half};
   const Vec3 momentum = inertia * w;
-  const Vec3 before = w * (dot(w, momentum) * quarter2) - cross(w, momentum) * half;
+  const Vec3 before = equation.quadratic(w, momentum, -1);
   *change = {};
   Vec3 now = w, of_now = momentum;
-  for (int i = 0; i < iterations; ++i) {
-    const Real twice_energy = dot(now, of_now);
-    const Vec3 after = now * (twice_energy * quarter2) + cross(now, of_now) * half;
-    const Vec3 error = inertia * *change + (after - before);
-    Mat3 slope =
-        inertia + (skew_symmetric(now) * inertia + skew_symmetric(of_now) * Real(-1)) * half;
-    for (int k = 0; k < 3; ++k) {
-      slope.row[k] += of_now * (2 * quarter2 * now[k]);
-      slope.row[k][k] += twice_energy * quarter2;
+
+  // A fixed-point iteration multiplies the error by less than w dt, or by (w dt)^2 times the
+  // largest moment of inertia divided by the smallest one.
+  const Real factor = Real(1) / dot(inertia.row[0], inverse.column(0));
+  const Real rate2 = turned2 * (inverse(0, 0) + inverse(1, 1) + inverse(2, 2)) * factor;
+  if (rate2 >= 0 && rate2 <= kSlowRotation) {
+    for (int left = rate2 > kSlowerRotation ? 3 : 2;;) {
+      *change = inverse * ((before - equation.quadratic(now, of_now, 1)) * factor);
+      if (--left == 0) return true;
+      now = w + *change;
+      of_now = inertia * now;
     }
-    Mat3 inverse;
-    if (!invert(slope, &inverse)) return false;
-    *change -= inverse * error;
+  }
+
+  // With two or three iterations, the error of a slow rotation is below (w dt)^7 or ^15.
+  constexpr Real kFast = Real(1e-2), kVeryFast = Real(0.04);
+  const int iterations = turned2 > kVeryFast ? 8 : turned2 > kFast ? 3 : 2;
+  for (int i = 0; i < iterations; ++i) {
+    const Vec3 error = inertia * *change + (equation.quadratic(now, of_now, 1) - before);
+    Mat3 inverse_slope;
+    if (!invert(equation.slope(now, of_now), &inverse_slope)) return false;
+    *change -= inverse_slope * error;
     now = w + *change;
     of_now = inertia * now;
   }

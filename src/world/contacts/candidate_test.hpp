@@ -10,6 +10,11 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+JFPX_HD inline soft_step::ContactKey key_of(const SubShapeView& sub_shapes, const Candidate& pair) {
+  return {pair.a, pair.b, sub_shapes.part(pair.sub_shape_a),
+          sub_shapes.is_mesh(pair.sub_shape_b) ? pair.element : sub_shapes.part(pair.sub_shape_b)};
+}
+
 /// Finds the contact of two sub-shapes that may touch during the step. Sensors have no points for
 /// the solver.
 /// @param last_points points of the contacts of the last step
@@ -20,10 +25,7 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
                                    const soft_step::PointInput* last_points,
                                    const FindLast& find_last, CandidateManifold* found) {
   const BodyView& bodies = bounds.bodies;
-  found->key = {pair.a, pair.b, bounds.sub_shapes.part(pair.sub_shape_a),
-                bounds.sub_shapes.is_mesh(pair.sub_shape_b)
-                    ? pair.element
-                    : bounds.sub_shapes.part(pair.sub_shape_b)};
+  found->key = key_of(bounds.sub_shapes, pair);
   found->clear();
   const bool is_recyclable = bounds.sub_shapes.has_flat_faces(pair.sub_shape_a) &&
                              bounds.sub_shapes.has_flat_faces(pair.sub_shape_b);

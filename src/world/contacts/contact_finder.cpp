@@ -87,11 +87,13 @@ void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
   motion_.resize(bodies.capacity());
   swept_.resize(sub_shapes_.ranges().bounded());
   margins_.resize(sub_shapes_.ranges().bounded());
+  boxes_.resize(sub_shapes_.ranges().fixed_begin() - sub_shapes_.ranges().spheres());
   swept_bounds_ = {.bodies = bodies.view(),
                    .sub_shapes = sub_shapes_.view(),
                    .motion = motion_.data(),
                    .margins = margins_.data(),
                    .swept = swept_.data(),
+                   .boxes = boxes_.data(),
                    .largest_margin = margin * Real(0.5)};
 }
 
@@ -252,6 +254,81 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
       });
 }
 
+/// Removes the points that another contact of the same body a hides.
+/// @param run contacts of a body a
+/// @returns whether a point was hidden
+bool ContactFinder::hide_points_of_body(std::span<soft_step::ManifoldInput> run,
+                                        soft_step::PointInput* points, Part* part) const {
+  const SubShapeView& sub_shapes = swept_bounds_.sub_shapes;
+  part->surfaces.clear();
+  auto pair = std::ranges::lower_bound(candidates_, run.front().key.a, {}, &Candidate::a);
+  for (soft_step::ManifoldInput& manifold : run) {
+    while (key_of(sub_shapes, *pair) != manifold.key) ++pair;
+    if (!is_polyhedral(sub_shapes, *pair)) continue;
+    const SurfaceContact contact{&*pair, manifold.normal, points + manifold.first, manifold.count};
+    part->surfaces.push_back({contact, &manifold, 0});
+  }
+  bool any = false;
+  for (Part::Surface& surface : part->surfaces) {
+    for (const Part::Surface& other : part->surfaces) {
+      if (&other == &surface) continue;
+      surface.hidden |= hidden_points(swept_bounds_, surface.contact, other.contact);
+    }
+    any |= surface.hidden != 0;
+  }
+  for (const Part::Surface& surface : part->surfaces) {
+    if (surface.hidden == 0) continue;
+    soft_step::ManifoldInput& manifold = *surface.manifold;
+    manifold.count = remove_points(surface.hidden, manifold.count, points + manifold.first);
+    manifold.tested = {};  // a hidden point may be visible in the next step
+  }
+  return any;
+}
+
+/// Removes hidden points from the contacts of candidates_, which begin at number `first`.
+void ContactFinder::hide_points(std::size_t first, Results* results, ThreadPool* pool) {
+  const BodyView& bodies = swept_bounds_.bodies;
+  const auto manifolds =
+      std::span(*results->manifolds.items).first(results->manifolds.size).subspan(first);
+  soft_step::PointInput* const points = results->points.items->data();
+  const auto find = [&](std::size_t begin, std::size_t end, Part* part) {
+    // A run of contacts with the same a belongs to the chunk where it begins.
+    while (begin > 0 && begin < end && manifolds[begin].key.a == manifolds[begin - 1].key.a) {
+      ++begin;
+    }
+    while (begin < end) {
+      const std::uint32_t a = manifolds[begin].key.a;
+      std::size_t last = begin, immovable = 0;
+      bool may_hide = false;
+      for (; last < manifolds.size() && manifolds[last].key.a == a; ++last) {
+        const std::uint32_t b = manifolds[last].key.b;
+        may_hide |= last > begin && b == manifolds[last - 1].key.b;
+        if (is_immovable(bodies, b)) ++immovable;
+      }
+      if (may_hide || immovable > 1) {
+        part->any_hidden |=
+            hide_points_of_body(manifolds.subspan(begin, last - begin), points, part);
+      }
+      begin = last;
+    }
+  };
+  bool any = false;
+  for_each_batch(pool, manifolds.size(), kCandidatesPerChunk, find, [&](std::span<Part> parts) {
+    for (const Part& part : parts) any |= part.any_hidden;
+  });
+  if (!any) return;
+  std::size_t kept = first;
+  std::uint32_t kept_points = manifolds.front().first;
+  for (const soft_step::ManifoldInput& manifold : manifolds) {
+    if (manifold.count == 0) continue;
+    std::copy_n(points + manifold.first, manifold.count, points + kept_points);
+    soft_step::ManifoldInput& moved = (*results->manifolds.items)[kept++] = manifold;
+    moved.first = std::exchange(kept_points, kept_points + manifold.count);
+  }
+  results->manifolds.size = kept;
+  results->points.size = kept_points;
+}
+
 std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Real margin,
                                                      ThreadPool* pool, const ContactSet& recyclable,
                                                      ContactSet* set, DetectedContacts* detected) {
@@ -299,7 +376,9 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
                  });
   candidates.finish();
   sort_runs(&candidates_, &merged_candidates_);
+  const std::size_t first_general = results.manifolds.size;
   test_candidates(bodies, candidates_, recyclable, &results, pool);
+  hide_points(first_general, &results, pool);
   results.spheres.finish();
   results.manifolds.finish();
   results.points.finish();

@@ -11,6 +11,7 @@
 #include "src/world/contacts/candidate_test.hpp"
 #include "src/world/contacts/detected_contacts.hpp"
 #include "src/world/contacts/fixed_trees.hpp"
+#include "src/world/contacts/hidden_points.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -71,6 +72,14 @@ class ContactFinder {
     std::size_t touching_spheres = 0;  ///< contacts in `spheres` with distance <= 0
     std::vector<Contact> touches;      ///< other contacts with distance <= 0
     std::vector<Candidate> candidates, compounds;
+    /// A contact of a body, and its hidden points (bit i: point i).
+    struct Surface {
+      SurfaceContact contact;
+      soft_step::ManifoldInput* manifold = nullptr;
+      std::uint32_t hidden = 0;
+    };
+    std::vector<Surface> surfaces;
+    bool any_hidden = false;
     void add(const BodyStore& bodies, const CandidateManifold& found);
     void clear() {
       spheres.clear();
@@ -80,6 +89,7 @@ class ContactFinder {
       touches.clear();
       candidates.clear();
       compounds.clear();
+      any_hidden = false;
     }
   };
   void start_bounds(const BodyStore& bodies, Real margin);
@@ -91,6 +101,9 @@ class ContactFinder {
   struct Results;
   void test_candidates(const BodyStore& bodies, std::span<const Candidate> candidates,
                        const soft_step::ContactSet& recyclable, Results* results, ThreadPool* pool);
+  bool hide_points_of_body(std::span<soft_step::ManifoldInput> run, soft_step::PointInput* points,
+                           Part* part) const;
+  void hide_points(std::size_t first, Results* results, ThreadPool* pool);
   template <class Find, class AppendAll>
   void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
                       const AppendAll& append_all);
@@ -103,6 +116,7 @@ class ContactFinder {
   std::vector<Vec3> motion_;           ///< by body [m]
   std::vector<SphereInstance> swept_;  ///< by solid: bounds of the step's motion
   std::vector<Real> margins_;          ///< by solid [m]
+  std::vector<Aabb> boxes_;            ///< SweptBounds::boxes
   SweptBounds swept_bounds_;           ///< of the arrays above, during a search
   // Of find_speculative_contacts():
   std::vector<Candidate> compounds_;  ///< pairs of spheres, at least one of a compound

@@ -20,6 +20,7 @@ inline namespace JFPX_ABI {
 struct CandidateManifold : detail::PairManifold {
   soft_step::ContactKey key;
   soft_step::TestedPoses tested;
+  std::uint32_t hidden = 0;  ///< on a device: bit i if another contact hides the point i
 };
 
 /// Prepares a contact of a full test for recycle().

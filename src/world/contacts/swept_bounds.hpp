@@ -31,9 +31,13 @@ struct SweptBounds {
   const Vec3* motion = nullptr;     ///< [m], by body: BodyView::predicted_motion()
   Real* margins = nullptr;          ///< [m], by sub-shape
   SphereInstance* swept = nullptr;  ///< by sub-shape, without walls: bounds of the step's motion
-  Real largest_margin = 0;          ///< [m]
+  /// By solid other than a sphere of a movable body, the first is SubShapeRanges::spheres(): bounds
+  /// of the step's motion.
+  Aabb* boxes = nullptr;
+  Real largest_margin = 0;  ///< [m]
 
-  /// Fills swept[i] with a sphere that encloses the motion of the sub-shape, and margins[i].
+  /// Fills swept[i] and boxes with a sphere and a box that enclose the motion of the sub-shape, and
+  /// margins[i].
   JFPX_HD void sweep(SubShape i) const {
     // The margin is at most this fraction of the size, so that small bodies do not get contacts
     // with all their neighbors.
@@ -55,12 +59,12 @@ struct SweptBounds {
       sphere.centre += half_motion;
       sphere.radius += length(half_motion) + smaller(turned, Real(2)) * reach;
     }
-    swept[i] = rounded(sphere);
+    set_bounds(i, sphere);
   }
-  /// sweep() without margin and motion: a sphere that encloses the sub-shape at its current pose.
+  /// sweep() without margin and motion: bounds of the sub-shape at its current pose.
   JFPX_HD void enclose(SubShape i) const {
     margins[i] = 0;
-    swept[i] = rounded(sub_shapes.bounds(i));
+    set_bounds(i, sub_shapes.bounds(i));
   }
 
   /// @param a,b sub-shapes whose swept bounds touch, a < b
@@ -69,7 +73,9 @@ struct SweptBounds {
     const bool any_movable = bodies.movable(x) || bodies.movable(y);
     if (x == y || !any_movable || !bodies.may_collide(x, y)) return PairKind::none;
     if (!sub_shapes.is_sphere(b)) {
-      const bool meet = may_meet(a, b) && (sub_shapes.is_sphere(a) || may_meet(b, a));
+      const bool meet = sub_shapes.is_sphere(a)
+                            ? may_meet(a, b)
+                            : overlap(box_of(a), box_of(b)) && may_meet(a, b) && may_meet(b, a);
       return meet ? PairKind::general : PairKind::none;
     }
     return bodies.radius[x] > 0 && bodies.radius[y] > 0 ? PairKind::spheres : PairKind::compounds;
@@ -123,7 +129,7 @@ struct SweptBounds {
   /// [m], predicted relative motion of the sub-shapes of a candidate. A mesh has the motion of its
   /// point at the centre of the solid.
   JFPX_HD Vec3 motion_of(const Candidate& pair) const {
-    const Vec3 relative = bodies.predicted_motion(pair.a) - bodies.predicted_motion(pair.b);
+    const Vec3 relative = motion[pair.a] - motion[pair.b];
     if (sub_shapes.is_wall(pair.sub_shape_b) || !sub_shapes.is_mesh(pair.sub_shape_b) ||
         bodies.awake[pair.b] == 0) {
       return relative;
@@ -143,23 +149,14 @@ struct SweptBounds {
   }
 
   /// Bounds of a solid of mass 0 in the tree. If they do not overlap query_bounds() of a movable
-  /// sub-shape, may_meet() is false: each bound includes its part of the radius in may_meet(), with
-  /// twice the error.
+  /// sub-shape, the two have no contact: as in may_meet(), each includes its own motion and margin,
+  /// with twice the error.
   JFPX_HD Aabb tree_bounds(SubShape fixed) const {
-    const PosedSolid& posed = sub_shapes.solid(fixed);
     const Real moved = swept[fixed].radius - sub_shapes.bounds(fixed).radius;
-    const Real far = sum(posed.pose.origin) + swept[fixed].radius;
-    const Real reach = posed.solid.radius + 2 * moved + 32 * kEpsilon * far + kEpsilon;
-    Aabb box;
-    for (int i = 0; i < 3; ++i) {
-      const Real half =
-          reach + detail::projected_half_length(posed.solid.half_extents, posed.pose.basis.row[i]);
-      box.lower[i] = posed.pose.origin[i] - half;
-      box.upper[i] = posed.pose.origin[i] + half;
-    }
-    return box;
+    return box_around(fixed, sub_shapes.solid(fixed).pose.origin, 2 * moved);
   }
   JFPX_HD Aabb query_bounds(SubShape i) const {
+    if (!sub_shapes.is_sphere(i)) return box_of(i);
     const SphereInstance& sphere = swept[i];
     const Real reach = sphere.radius + 32 * kEpsilon * (sum(sphere.centre) + sphere.radius);
     const Vec3 half{reach, reach, reach};
@@ -190,6 +187,30 @@ struct SweptBounds {
   }
 
  private:
+  /// The swept box of a solid of a movable body other than a sphere.
+  JFPX_HD const Aabb& box_of(SubShape i) const { return boxes[i - sub_shapes.ranges.spheres()]; }
+  /// A box around a solid other than a sphere, moved to `centre` and enlarged by `more`.
+  JFPX_HD Aabb box_around(SubShape i, const Vec3& centre, Real more) const {
+    const PosedSolid& posed = sub_shapes.solid(i);
+    const Real far = sum(centre) + swept[i].radius;
+    const Real reach = posed.solid.radius + more + 32 * kEpsilon * far + kEpsilon;
+    Aabb box;
+    for (int k = 0; k < 3; ++k) {
+      const Real half =
+          reach + detail::projected_half_length(posed.solid.half_extents, posed.pose.basis.row[k]);
+      box.lower[k] = centre[k] - half;
+      box.upper[k] = centre[k] + half;
+    }
+    return box;
+  }
+  /// @param sphere encloses the sub-shape during the step
+  JFPX_HD void set_bounds(SubShape i, const SphereInstance& sphere) const {
+    swept[i] = rounded(sphere);
+    const SubShapeRanges& ranges = sub_shapes.ranges;
+    if (i < ranges.spheres() || i >= ranges.fixed_begin()) return;
+    const Real moved = swept[i].radius - sub_shapes.bounds(i).radius;
+    boxes[i - ranges.spheres()] = box_around(i, swept[i].centre, moved);
+  }
   /// Calls visit(mesh, triangle) for the triangles of a mesh whose motion may touch that of a
   /// sub-shape. Conservative.
   template <class Visit>

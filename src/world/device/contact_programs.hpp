@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/base/atomic.hpp"
+#include "src/world/contacts/hidden_points.hpp"
 #include "src/world/device/list.hpp"
 #include "src/world/device/start_step.hpp"
 #include "src/world/device/step_data.hpp"
@@ -183,6 +184,7 @@ struct ShapeProgram {
       return;
     }
     team.for_each(d.counters->candidates, [&](std::uint32_t i) { test(i); });
+    team.for_each(d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); });
     const auto size = [&](std::uint32_t body) { return d.manifold_sizes[body]; };
     const std::uint64_t sizes =
         team.scan(d.step.bodies.capacity, size, size,
@@ -234,6 +236,51 @@ struct ShapeProgram {
                             found.touches[k].point,
                             found.touches[k].distance};
     }
+  }
+
+  /// Removes the points that another contact of the same body a hides.
+  JFPX_HD void hide_points(std::uint32_t body) const {
+    const StepData& d = data;
+    const std::uint32_t first = d.first_candidate[body];
+    if (first == kNone || d.next_candidate[first] == kNone) return;
+    const SubShapeView& sub_shapes = d.swept_bounds.sub_shapes;
+    const auto contact_of = [&](std::uint32_t i) {
+      const CandidateManifold& found = d.tested[i];
+      return SurfaceContact{&d.candidates[i], found.normal, found.points, found.point_count};
+    };
+    bool any = false;
+    for (std::uint32_t i = first; i != kNone; i = d.next_candidate[i]) {
+      std::uint32_t& hidden = d.tested[i].hidden;
+      hidden = 0;
+      if (!is_polyhedral(sub_shapes, d.candidates[i])) continue;
+      for (std::uint32_t k = first; k != kNone; k = d.next_candidate[k]) {
+        if (k == i || !is_polyhedral(sub_shapes, d.candidates[k])) continue;
+        hidden |= hidden_points(d.swept_bounds, contact_of(i), contact_of(k));
+      }
+      any |= hidden != 0;
+    }
+    if (any) remove_hidden(body);
+  }
+
+  JFPX_HD void remove_hidden(std::uint32_t body) const {
+    const StepData& d = data;
+    std::uint32_t* link = &d.first_candidate[body];
+    std::uint64_t sizes = 0;
+    while (*link != kNone) {
+      const std::uint32_t i = *link;
+      CandidateManifold& found = d.tested[i];
+      if (found.hidden != 0) {
+        found.point_count = remove_points(found.hidden, found.point_count, found.points);
+        found.tested = {};  // a hidden point may be visible in the next step
+      }
+      if (found.point_count == 0) {
+        *link = d.next_candidate[i];
+      } else {
+        sizes += std::uint64_t{1} << 32 | found.point_count;
+        link = &d.next_candidate[i];
+      }
+    }
+    d.manifold_sizes[body] = sizes;
   }
 
   /// Builds the manifolds of a body a, sorted by key. @param sizes exclusive prefix sum of sizes

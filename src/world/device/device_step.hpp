@@ -300,7 +300,7 @@ class DeviceStep final : public DeviceWorld {
   void use_sub_shapes() {
     data_.swept_bounds.sub_shapes = current_sub_shapes().view();
     data_.swept_bounds.sub_shapes.meshes = trees_.meshes();
-    scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().ranges().bounded(), &data_);
+    scratch_.reserve_sub_shapes(transfer_, current_sub_shapes().ranges(), &data_);
     is_ready_ = false;
   }
 

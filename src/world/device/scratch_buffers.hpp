@@ -46,10 +46,13 @@ class ScratchBuffers {
     return data.step.bodies.has_blocks ? orientation_by_index_.data() : data.step.orientation;
   }
 
-  /// Reserves the arrays indexed by sub-shape. @param n number of sub-shapes without walls
-  void reserve_sub_shapes(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
-    data->swept_bounds.margins = transfer.room_to_grow(&margins_, n);
-    data->swept_bounds.swept = transfer.room_to_grow(&swept_, n);
+  /// Reserves the arrays indexed by sub-shape.
+  void reserve_sub_shapes(const Transfer<Device>& transfer, const SubShapeRanges& ranges,
+                          StepData* data) {
+    const std::size_t boxes = ranges.fixed_begin() - ranges.spheres();
+    data->swept_bounds.margins = transfer.room_to_grow(&margins_, ranges.bounded());
+    data->swept_bounds.swept = transfer.room_to_grow(&swept_, ranges.bounded());
+    data->swept_bounds.boxes = transfer.room_to_grow(&boxes_, boxes);
   }
 
   /// Reserves the lists. Sets StepData::capacity.
@@ -140,6 +143,7 @@ class ScratchBuffers {
   Buffer<Vec3> motion_;
   Buffer<Real> margins_;
   Buffer<SphereInstance> swept_;
+  Buffer<Aabb> boxes_;
   Buffer<SpherePair> pairs_;
   Buffer<cuda::ContactCount> pair_count_;
   Buffer<NormalDistance> pair_results_;

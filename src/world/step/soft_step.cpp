@@ -13,7 +13,9 @@
 #include "src/base/reserve.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <functional>
 #include <utility>
 
@@ -26,6 +28,7 @@ using soft_step::ContactSet;
 using soft_step::ContactView;
 
 constexpr std::size_t kBodiesPerChunk = 512, kContactsPerChunk = 2048;
+constexpr std::size_t kBodiesPerKernel = 64;
 
 }  // namespace
 
@@ -78,6 +81,9 @@ void SoftStep::prepare(const BodyStore& bodies) {
   orientation_.resize(capacity);
   if (joints_.count > 0) moved_rotation_.resize(capacity);
   free_.resize(capacity);
+  if (bodies.view().tensor != nullptr && solver_.body_kernels() != nullptr) {
+    gyroscopic_.resize(capacity);
+  }
   marked_.resize(capacity);
   parent_.resize(capacity);
   partition_.reserve(bodies);
@@ -142,7 +148,12 @@ bool SoftStep::any_body(const BodyStore& store, const Test& test) {
 
 /// Loads the bodies of a step, except immovable bodies without contacts and joints.
 void SoftStep::load(const BodyStore& store) {
-  for_each_body(store, [this](std::uint32_t i) { step_.load(i); });
+  const bool any_kernels = solver_.body_kernels() != nullptr;
+  for_each_body(store, [&](std::uint32_t i) {
+    step_.load(i);
+    const bool is_gyroscopic = step_.bodies.is_active(i) && step_.bodies.has_gyroscopic_term(i);
+    if (any_kernels && is_gyroscopic) gyroscopic_[i] = step_.substep_body(i);
+  });
   if (store.mobile().size() == store.size()) return;
   const std::span<const BodyId> ids = store.ids();
   parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
@@ -210,25 +221,108 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
   return find_runaway(*bodies);
 }
 
+cpu::BodySweep SoftStep::body_sweep(bool is_first) {
+  using soft_step::FreeMotion;
+  using soft_step::SubstepBody;
+  constexpr std::size_t kReal = sizeof(Real);
+  static_assert(sizeof(Quat) == 4 * kReal && offsetof(Quat, w) == 0);
+  static_assert(sizeof(FreeMotion) == cpu::kFreeStride * kReal);
+  static_assert(offsetof(FreeMotion, angular_velocity) == 3 * kReal);
+  static_assert(sizeof(SubstepBody) == cpu::kConstantsStride * kReal);
+  static_assert(offsetof(SubstepBody, velocity_kept) == 3 * kReal);
+  static_assert(offsetof(SubstepBody, angular_acceleration) == 4 * kReal);
+  static_assert(offsetof(SubstepBody, angular_velocity_kept) == 7 * kReal);
+  static_assert(sizeof(Mat3) == cpu::kMatrixStride * kReal);
+  return {.bodies = reinterpret_cast<Real*>(step_.solver),
+          .orientations = reinterpret_cast<Real*>(step_.orientation),
+          .free = reinterpret_cast<Real*>(free_.data()),
+          .constants = reinterpret_cast<const Real*>(gyroscopic_.data()),
+          .inertia = reinterpret_cast<const Real*>(step_.bodies.tensor),
+          .inverse_inertia = reinterpret_cast<const Real*>(step_.bodies.body_inverse_inertia),
+          .substep = step_.bodies.substep,
+          .h = step_.h,
+          .shortest2 = kEpsilon * kEpsilon,
+          .two_iterations = detail::kSlowerRotation,
+          .three_iterations = detail::kSlowRotation,
+          .is_first = is_first};
+}
+
+/// Calls stage(bodies) for parts of all bodies that are not immovable.
+template <class Stage>
+void SoftStep::for_each_part(const BodyStore& store, const Stage& stage) {
+  const std::span<const std::uint32_t> bodies = store.mobile();
+  parallel_for(pool_, bodies.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (; first < last; first += kBodiesPerKernel) {
+      stage(bodies.subspan(first, std::min(kBodiesPerKernel, last - first)));
+    }
+  });
+}
+
+/// Starts a substep of all active bodies.
+void SoftStep::accelerate_bodies(const BodyStore& store, bool is_first) {
+  using soft_step::SubstepBody;
+  const cpu::BodySweepKernels* kernels = solver_.body_kernels();
+  const cpu::BodySweep sweep = body_sweep(is_first);
+  const auto accelerate = [&](std::uint32_t i, const SubstepBody& body) {
+    step_.accelerate(i, body, step_.orientation[i], &step_.solver[i], &free_[i], is_first);
+  };
+  for_each_part(store, [&](std::span<const std::uint32_t> part) {
+    std::array<std::uint32_t, kBodiesPerKernel> items[2], left;
+    std::size_t counts[2] = {};
+    for (const std::uint32_t i : part) {
+      if (!step_.bodies.is_active(i)) continue;
+      if (kernels == nullptr || !step_.bodies.has_gyroscopic_term(i)) {
+        accelerate(i, step_.substep_body(i));
+        continue;
+      }
+      const SubstepBody& body = gyroscopic_[i];
+      const bool is_free = body.has(SubstepBody::kIsFree);
+      if (is_free && body.has(SubstepBody::kHasForce)) {
+        accelerate(i, body);
+      } else {
+        items[is_free][counts[is_free]++] = i;
+      }
+    }
+    for (std::size_t kind = 0; kind < 2; ++kind) {
+      if (counts[kind] == 0) continue;
+      const std::size_t count =
+          kernels->accelerate[kind](sweep, items[kind].data(), counts[kind], left.data());
+      for (const std::uint32_t i : std::span(left).first(count)) accelerate(i, gyroscopic_[i]);
+    }
+  });
+}
+
+/// Integrates the velocities of all awake bodies over a substep.
+void SoftStep::move_bodies(const BodyStore& store) {
+  const cpu::BodySweepKernels* kernels = solver_.body_kernels();
+  const cpu::BodySweep sweep = body_sweep(false);
+  for_each_part(store, [&](std::span<const std::uint32_t> part) {
+    std::array<std::uint32_t, kBodiesPerKernel> items;
+    std::size_t count = 0;
+    for (const std::uint32_t i : part) {
+      if (step_.bodies.awake[i] == 0) continue;
+      const bool has_joints = step_.constrained[i] >= soft_step::kHasJoint;
+      if (kernels != nullptr && !has_joints) {
+        items[count++] = i;
+      } else {
+        step_.move(i, has_joints, &step_.orientation[i], &step_.solver[i]);
+      }
+    }
+    if (count > 0) kernels->move(sweep, items.data(), count);
+  });
+}
+
 void SoftStep::run_substeps(const BodyStore& bodies) {
   using soft_step::Sweep;
   for (std::uint32_t substep = 0; substep < settings_.substeps; ++substep) {
-    for_each_body(bodies, [&](std::uint32_t i) {
-      if (!step_.bodies.is_active(i)) return;
-      step_.accelerate(i, step_.substep_body(i), step_.orientation[i], &step_.solver[i], &free_[i],
-                       substep == 0);
-    });
+    accelerate_bodies(bodies, substep == 0);
     if (substep == 0) solver_.sweep(Sweep::warm_start);
     if (joints_.count > 0) {
       solver_.sweep(Sweep::first_joints);
       for (std::uint32_t k = 1; k < constants_.joint_sweeps; ++k) solver_.sweep(Sweep::joints);
     }
     solver_.sweep(Sweep::bias);
-    for_each_body(bodies, [this](std::uint32_t i) {
-      if (step_.bodies.awake[i] == 0) return;
-      const bool has_joints = step_.constrained[i] >= soft_step::kHasJoint;
-      step_.move(i, has_joints, &step_.orientation[i], &step_.solver[i]);
-    });
+    move_bodies(bodies);
     for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.sweep(Sweep::relax);
   }
   if (solver_.needs_restitution()) solver_.sweep(Sweep::restitution);

@@ -74,6 +74,11 @@ class SoftStep {
   void mark_constrained();
   template <class Stage>
   void for_each_body(const BodyStore& bodies, const Stage& stage);
+  template <class Stage>
+  void for_each_part(const BodyStore& bodies, const Stage& stage);
+  cpu::BodySweep body_sweep(bool is_first);
+  void accelerate_bodies(const BodyStore& bodies, bool is_first);
+  void move_bodies(const BodyStore& bodies);
   void run_substeps(const BodyStore& bodies);
   template <class Test>
   bool any_body(const BodyStore& bodies, const Test& test);
@@ -91,14 +96,15 @@ class SoftStep {
 
   soft_step::JointView joints_;  ///< during a step
   soft_step::StepBodies step_;   ///< of the arrays below and the bodies, during a step
-  std::vector<soft_step::SolverBody> bodies_;  ///< by body
-  std::vector<std::uint8_t> traits_;           ///< by body: soft_step::BodyTraits
-  std::vector<Quat> orientation_;              ///< by body, during the step
-  std::vector<Vec3> moved_rotation_;           ///< by body, if there are joints
-  std::vector<soft_step::FreeMotion> free_;    ///< by body
-  std::vector<std::uint8_t> constrained_;      ///< by body: StepBodies::constrained
-  std::vector<std::uint32_t> parent_;          ///< by body: soft_step::DisjointSets::parent
-  std::vector<std::uint8_t> marked_;           ///< by label of an island
+  std::vector<soft_step::SolverBody> bodies_;       ///< by body
+  std::vector<std::uint8_t> traits_;                ///< by body: soft_step::BodyTraits
+  std::vector<Quat> orientation_;                   ///< by body, during the step
+  std::vector<Vec3> moved_rotation_;                ///< by body, if there are joints
+  std::vector<soft_step::FreeMotion> free_;         ///< by body
+  std::vector<soft_step::SubstepBody> gyroscopic_;  ///< by body, if a kernel takes it
+  std::vector<std::uint8_t> constrained_;           ///< by body: StepBodies::constrained
+  std::vector<std::uint32_t> parent_;               ///< by body: soft_step::DisjointSets::parent
+  std::vector<std::uint8_t> marked_;                ///< by label of an island
   Partition partition_;
 };
 

@@ -1,7 +1,14 @@
 /// Vector kernels of the soft step for rows of manifolds. Without AVX2, rows are solved one by one.
+///
+/// Sweeps read bundles (Nordby, bepuphysics2, 2018): the rows of the lanes of a vector side by
+/// side, so that no sweep transposes them. A bundle holds consecutive rows from a multiple of
+/// kBundle on.
 #pragma once
 
 #include "src/contact_solver/soft_step/cpu/sweep_layout.hpp"
+
+#include <cstddef>
+#include <cstdint>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -33,30 +40,102 @@ inline constexpr std::size_t kSpinA = 8;   ///< spin a, normal impulse
 inline constexpr std::size_t kSpinB = 12;  ///< spin b, rebound
 }  // namespace point_row_quad
 
+/// Rows of a bundle.
+inline constexpr std::size_t kBundle = 32 / sizeof(Real);
+
+/// Vectors of the rows of a bundle. A lever has 12 vectors: see soft_step::Lever.
+namespace bundle_vector {
+inline constexpr std::size_t kNormal = 0;
+inline constexpr std::size_t kFriction = 3;
+inline constexpr std::size_t kTangent = 4;
+inline constexpr std::size_t kTwistArm = 7;
+inline constexpr std::size_t kBitangent = 8;
+inline constexpr std::size_t kTwistMass = 11;
+inline constexpr std::size_t kLeverX = 12;
+inline constexpr std::size_t kLeverY = 24;
+inline constexpr std::size_t kTwistA = 36;
+inline constexpr std::size_t kTwistB = 39;
+inline constexpr std::size_t kMasses = 42;  ///< xx, xy, yy
+inline constexpr std::size_t kSlipMass = 45;
+inline constexpr std::size_t kImpulses = 46;  ///< friction x, friction y, twist
+inline constexpr std::size_t kPointCount = 49;
+inline constexpr std::size_t kCount = 50;
+}  // namespace bundle_vector
+
+/// Vectors of a point of each row of a bundle.
+namespace bundle_point {
+inline constexpr std::size_t kTurnA = 0;
+inline constexpr std::size_t kTurnB = 3;
+inline constexpr std::size_t kSpinA = 6;
+inline constexpr std::size_t kSpinB = 9;
+inline constexpr std::size_t kDistance = 12;
+inline constexpr std::size_t kMass = 13;
+inline constexpr std::size_t kImpulse = 14;
+inline constexpr std::size_t kRebound = 15;
+inline constexpr std::size_t kCount = 16;
+}  // namespace bundle_point
+
+/// Numbers of a bundle. The bodies of an unused lane are those of a used one.
+struct BundleNumbers {
+  std::uint32_t a[kBundle], b[kBundle];  ///< bodies
+  std::uint32_t used;                    ///< one bit per lane with a row
+  std::uint32_t rolls;                   ///< rows with rolling or spinning friction
+};
+
+/// The bundles of all rows.
+struct ManifoldBundles {
+  BundleNumbers* numbers;
+  Real* rows;                        ///< bundle_vector::kCount vectors of each bundle
+  Real* points;                      ///< bundle_point::kCount vectors of each point
+  const std::uint32_t* first_point;  ///< by bundle, and the end
+};
+
 /// Rows of contacts whose bodies a are different. Bodies b are different from them and each other,
 /// or are fixed.
 struct ManifoldSweep {
-  Real* rows;    ///< ManifoldRow
-  Real* points;  ///< PointRow
+  ManifoldBundles bundles;
   Real* bodies;  ///< SolverBody
   SweepConstants constants;
   SweepSoftness softness;
 };
 
 /// Processes the rows [first, last) like the functions of manifold_row.hpp, except rows with
-/// rolling or spinning friction.
+/// rolling or spinning friction. Calls for rows of the same bundle must not be concurrent.
 /// @param left receives the skipped rows, at most last - first
 /// @returns the number of skipped rows
 using ManifoldSweepFunction = std::size_t (*)(const ManifoldSweep& sweep, std::size_t first,
                                               std::size_t last, std::uint32_t* left);
 
+/// Value of ManifoldSetup::counts of a number without a row. The first row of a bundle exists.
+inline constexpr std::uint8_t kNoManifold = 0xff;
+
+/// Rows that RowSetup::start_row() has started, and their bundles.
+struct ManifoldSetup {
+  Real* rows;                  ///< ManifoldRow
+  Real* points;                ///< PointRow
+  const std::uint8_t* counts;  ///< points by row, or kNoManifold
+  ManifoldBundles bundles;
+  const Real* bodies;           ///< SolverBody, at the start of the step
+  const Real* inverse_inertia;  ///< Mat3, by body, world axes
+  Real inverse_friction_gap;    ///< of RowSetup
+  Real least_weight;            ///< soft_step::kLeastWeight
+  Real least_determinant;       ///< soft_step::kLeastDeterminant
+};
+/// Processes the bundles [first, last). A row has at least one point.
+using BundleFunction = void (*)(const ManifoldSetup& setup, std::size_t first, std::size_t last);
+
 struct ManifoldSweepKernels {
+  /// Completes the rows like RowSetup::fill(), and writes the bundles.
+  BundleFunction complete;
   ManifoldSweepFunction warm_start;
   ManifoldSweepFunction solve[2];  ///< index 1: with bias
 };
 
 /// Index 1: with fixed bodies b.
 extern const ManifoldSweepKernels kAvx2ManifoldSweep[2];
+/// Writes the impulses of bundles to their rows, except those of rows with rolling or spinning
+/// friction, whose impulses are in the rows.
+extern const BundleFunction kAvx2UnpackManifolds;
 
 }  // namespace cpu
 }  // namespace JFPX_ABI

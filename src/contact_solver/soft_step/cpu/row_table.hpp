@@ -3,6 +3,7 @@
 
 #include "src/base/reserve.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -13,6 +14,9 @@ namespace soft_step {
 
 /// Divides the rows of one kind into cells, in this order: rows of blocks by part and color, other
 /// rows by color and part, rows with fixed bodies by their part, the overflow.
+///
+/// The rows of the inner cells, of each crossing color, of each part with fixed bodies, and of the
+/// overflow start at multiples of an alignment. Numbers before them may have no row.
 ///
 /// Usage: start(), set_size() for all cells with rows, scan(). Calls of set_size() may be
 /// concurrent.
@@ -25,9 +29,12 @@ class RowTable {
   };
 
   /// Sets the number of cells, without rows.
-  void start(const Shape& shape) {
+  void start(const Shape& shape, std::uint32_t alignment = 1) {
     shape_ = shape;
-    assign_geometric(&begin_, overflow() + 2, 0);
+    alignment_ = alignment;
+    size_ = 0;
+    assign_geometric(&begin_, overflow() + 1, 0);
+    assign_geometric(&end_, overflow() + 1, 0);
   }
   std::size_t inner(std::size_t part, std::size_t color) const {
     return part * shape_.inner_colors + color;
@@ -44,20 +51,38 @@ class RowTable {
   /// Computes the first rows of the cells from their sizes.
   void scan() {
     std::uint32_t sum = 0;
-    for (std::uint32_t& begin : begin_) {
-      const std::uint32_t count = begin;
-      begin = sum;
-      sum += count;
+    for (std::size_t cell = 0; cell < begin_.size(); ++cell) {
+      if (is_aligned(cell)) sum = aligned(sum);
+      const std::uint32_t count = begin_[cell];
+      begin_[cell] = sum;
+      end_[cell] = sum += count;
     }
+    size_ = aligned(sum);
   }
   std::uint32_t begin(std::size_t cell) const { return begin_[cell]; }
-  std::uint32_t end(std::size_t cell) const { return begin_[cell + 1]; }
-  /// Number of rows of all kinds of cells.
-  std::uint32_t size() const { return begin_.empty() ? 0 : begin_.back(); }
+  std::uint32_t end(std::size_t cell) const { return end_[cell]; }
+  /// First row of a part of a crossing color, or the end. Unless it is the end, it is a multiple of
+  /// the alignment: threads that divide a color here do not share aligned groups of rows.
+  std::uint32_t crossing_boundary(std::size_t part, std::size_t color) const {
+    const std::uint32_t end = end_[crossing(shape_.parts - 1, color)];
+    return part == shape_.parts ? end : std::min(end, aligned(begin_[crossing(part, color)]));
+  }
+  /// Number of rows in all cells, and between them: a multiple of the alignment.
+  std::uint32_t size() const { return size_; }
 
  private:
+  bool is_aligned(std::size_t cell) const {
+    const std::size_t first_crossing = shape_.parts * shape_.inner_colors;
+    if (cell < first_crossing || cell >= fixed(0)) return true;
+    return (cell - first_crossing) % shape_.parts == 0;
+  }
+  std::uint32_t aligned(std::uint32_t row) const {
+    return (row + alignment_ - 1) / alignment_ * alignment_;
+  }
+
   Shape shape_;
-  std::vector<std::uint32_t> begin_;  ///< by cell, and the end
+  std::uint32_t alignment_ = 1, size_ = 0;
+  std::vector<std::uint32_t> begin_, end_;  ///< by cell
 };
 
 }  // namespace soft_step

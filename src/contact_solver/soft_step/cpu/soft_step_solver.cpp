@@ -21,6 +21,8 @@ namespace {
 
 constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096;
 constexpr std::size_t kRowsPerKernel = 64;
+[[maybe_unused]] constexpr std::size_t kBundlesPerChunk = 128;
+static_assert(kRowsPerKernel % cpu::kBundle == 0);
 // Of a world of one block.
 constexpr std::size_t kContactsPerPart = 512, kBodiesPerPart = 1024, kPartsPerChunk = 2;
 
@@ -118,6 +120,13 @@ auto function_of(const Kernels& kernels, Sweep sweep) {
 
 SoftStepSolver::SoftStepSolver(ThreadPool* pool, SimdLevel simd)
     : pool_(pool), uses_avx2_(has_avx2(usable_simd_level(simd))) {}
+
+const cpu::BodySweepKernels* SoftStepSolver::body_kernels() const {
+#if defined(__x86_64__)
+  if (uses_avx2_) return &cpu::kAvx2BodySweep;
+#endif
+  return nullptr;
+}
 
 /// Fills kinds_ and shape_, and lists the contacts with fixed bodies and in the overflow.
 void SoftStepSolver::inspect_contacts() {
@@ -358,7 +367,8 @@ void SoftStepSolver::place_fixed_rows(std::size_t part) {
   }
 }
 
-/// Builds the row of a contact. @param place of the row; receives that of the next one
+/// Builds the row of a contact. With vectors, rows of manifolds are only started: see
+/// complete_manifolds(). @param place of the row; receives that of the next one
 /// @returns the number of the row
 template <bool kFixed>
 std::uint32_t SoftStepSolver::fill(RowKind kind, std::uint32_t contact, Place* place) {
@@ -368,9 +378,16 @@ std::uint32_t SoftStepSolver::fill(RowKind kind, std::uint32_t contact, Place* p
     Row& row = all.rows[number];
     if constexpr (kHasParts<Row>) row.first = place->point;
     all.contacts[number] = contact;
-    setup_.fill<kFixed>(&row, all.parts_of(row), contact);
     if constexpr (std::is_same_v<Row, ManifoldRow>) {
+      if (uses_avx2_) {
+        setup_.start_row(&row, all.parts_of(row), contact);
+      } else {
+        setup_.fill<kFixed>(&row, all.parts_of(row), contact);
+      }
+      manifold_counts_[number] = static_cast<std::uint8_t>(row.count);
       if (any_rebounds(row, all.parts_of(row))) any_rebound_.store(true, std::memory_order_relaxed);
+    } else {
+      setup_.fill<kFixed>(&row, all.parts_of(row), contact);
     }
   });
   count(contact, place);
@@ -386,6 +403,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   constants_ = constants;
   bodies_ = bodies;
   has_blocks_ = has_blocks;
+  is_packed_ = false;
   any_rebound_.store(false, std::memory_order_relaxed);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
@@ -399,6 +417,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   for_parts(shape_.parts, [this](std::size_t part) { place_rows(part); });
   for_parts(shape_.fixed_parts, [this](std::size_t part) { place_fixed_rows(part); });
   place_overflow();
+  complete_manifolds();
 }
 
 /// Counts the rows, and reserves memory for them.
@@ -420,6 +439,71 @@ void SoftStepSolver::allocate_rows() {
       rows->parts.reserve_geometric(rows->part_table.size(), "points of contacts");
     }
   });
+  assign_geometric(&manifold_counts_, rows<ManifoldRow>().table.size(), cpu::kNoManifold);
+}
+
+cpu::ManifoldSetup SoftStepSolver::manifold_setup() {
+  Rows<ManifoldRow>& all = rows<ManifoldRow>();
+  return {.rows = reinterpret_cast<Real*>(all.rows.data()),
+          .points = reinterpret_cast<Real*>(all.parts.data()),
+          .counts = manifold_counts_.data(),
+          .bundles = {bundle_numbers_.data(), bundle_rows_.data(), bundle_points_.data(),
+                      first_point_.data()},
+          .bodies = reinterpret_cast<const Real*>(bodies_.data()),
+          .inverse_inertia = reinterpret_cast<const Real*>(setup_.properties.inverse_inertia),
+          .inverse_friction_gap = setup_.inverse_friction_gap,
+          .least_weight = kLeastWeight,
+          .least_determinant = kLeastDeterminant};
+}
+
+/// Completes the rows of manifolds, and writes their bundles.
+void SoftStepSolver::complete_manifolds() {
+#if defined(__x86_64__)
+  if (!uses_avx2_) return;
+  const RowTable& table = rows<ManifoldRow>().table;
+  const std::size_t bundles = table.size() / cpu::kBundle;
+  resize_geometric(&first_point_, bundles + 1);
+  std::uint32_t points = 0;
+  for (std::size_t bundle = 0; bundle < bundles; ++bundle) {
+    first_point_[bundle] = points;
+    std::uint32_t most = 0;
+    for (std::size_t k = 0; k < cpu::kBundle; ++k) {
+      const std::uint8_t count = manifold_counts_[bundle * cpu::kBundle + k];
+      if (count != cpu::kNoManifold) most = std::max<std::uint32_t>(most, count);
+    }
+    points += most;
+  }
+  first_point_[bundles] = points;
+  constexpr const char* kWhat = "rows of contacts";
+  bundle_numbers_.reserve_geometric(bundles, kWhat);
+  bundle_rows_.reserve_geometric(bundles * (cpu::bundle_vector::kCount * cpu::kBundle), kWhat);
+  bundle_points_.reserve_geometric(std::size_t{points} * (cpu::bundle_point::kCount * cpu::kBundle),
+                                   kWhat);
+  const cpu::ManifoldSetup setup = manifold_setup();
+  const std::size_t fixed = table.begin(table.fixed(0)) / cpu::kBundle;
+  const std::size_t overflow = table.begin(table.overflow()) / cpu::kBundle;
+  const auto complete = [&](bool is_fixed, std::size_t first, std::size_t last) {
+    if (first < last) cpu::kAvx2ManifoldSweep[is_fixed ? 1 : 0].complete(setup, first, last);
+  };
+  parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
+    complete(false, first, std::min(last, fixed));
+    complete(true, std::max(first, fixed), std::min(last, overflow));
+    complete(false, std::max(first, overflow), last);
+  });
+  is_packed_ = true;
+#endif
+}
+
+/// Writes the impulses of the bundles to the rows.
+void SoftStepSolver::unpack_manifolds() {
+#if defined(__x86_64__)
+  if (!is_packed_) return;
+  is_packed_ = false;
+  const cpu::ManifoldSetup setup = manifold_setup();
+  parallel_for(
+      pool_, rows<ManifoldRow>().table.size() / cpu::kBundle, kBundlesPerChunk,
+      [&](std::size_t first, std::size_t last) { cpu::kAvx2UnpackManifolds(setup, first, last); });
+#endif
 }
 
 void SoftStepSolver::place_overflow() {
@@ -513,9 +597,9 @@ void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t la
       std::is_same_v<Row, ManifoldRow> || (std::is_same_v<Row, SphereRow> && !kFixed);
   if constexpr (kHasKernel) {
     if (uses_avx2_ && sweep != Sweep::restitution) {
-      for (std::size_t begin = first; begin < last; begin += kRowsPerKernel) {
+      for (std::size_t begin = first, end = 0; begin < last; begin = end) {
         std::array<std::uint32_t, kRowsPerKernel> skipped;
-        const std::size_t end = std::min(last, begin + kRowsPerKernel);
+        end = std::min(last, (begin / kRowsPerKernel + 1) * kRowsPerKernel);
         const std::size_t count = run_kernel<Row, kFixed>(sweep, begin, end, skipped.data());
         for (std::size_t k = 0; k < count; ++k) run_row(rows, skipped[k], operation, IsFixed());
       }
@@ -572,8 +656,8 @@ void SoftStepSolver::sweep_crossing(Sweep sweep) {
       parallel_for(pool_, parts, chunk, [&](std::size_t first, std::size_t last) {
         for_all_kinds([&](auto* rows) {
           const RowTable& table = rows->table;
-          run_rows<false>(rows, table.begin(table.crossing(first, color)),
-                          table.end(table.crossing(last - 1, color)), sweep, operation);
+          run_rows<false>(rows, table.crossing_boundary(first, color),
+                          table.crossing_boundary(last, color), sweep, operation);
         });
       });
     }
@@ -591,6 +675,7 @@ void SoftStepSolver::sweep_overflow(Sweep sweep) {
 }
 
 void SoftStepSolver::sweep(Sweep sweep) {
+  if (sweep == Sweep::restitution) unpack_manifolds();
   sweep_overflow(sweep);
   if (shape_.inner_colors > 0) {
     for_parts(shape_.parts, [&](std::size_t block) { sweep_inner(block, sweep); });
@@ -603,9 +688,7 @@ void SoftStepSolver::sweep(Sweep sweep) {
 
 cpu::ManifoldSweep SoftStepSolver::manifold_sweep(bool is_fixed) {
   const StepConstants& c = constants_;
-  return {reinterpret_cast<Real*>(rows<ManifoldRow>().rows.data()),
-          reinterpret_cast<Real*>(rows<ManifoldRow>().parts.data()),
-          reinterpret_cast<Real*>(bodies_.data()), sweep_constants(c),
+  return {manifold_setup().bundles, reinterpret_cast<Real*>(bodies_.data()), sweep_constants(c),
           softness(is_fixed ? c.fixed : c.movable)};
 }
 
@@ -621,10 +704,14 @@ cpu::SphereSweep SoftStepSolver::sphere_sweep() {
 }
 
 void SoftStepSolver::store() {
-  for_all_kinds([this](auto* rows) {
+  unpack_manifolds();
+  for_all_kinds([this]<class Row>(Rows<Row>* rows) {
     parallel_for(pool_, rows->table.size(), kContactsPerChunk,
                  [&](std::size_t first, std::size_t last) {
                    for (std::size_t i = first; i < last; ++i) {
+                     if constexpr (std::is_same_v<Row, ManifoldRow>) {
+                       if (manifold_counts_[i] == cpu::kNoManifold) continue;
+                     }
                      const auto& row = rows->rows[i];
                      setup_.store(row, rows->parts_of(row), rows->contacts[i]);
                    }

@@ -6,6 +6,7 @@
 #include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/cpu/body_blocks.hpp"
+#include "src/contact_solver/soft_step/cpu/body_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/manifold_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/row_table.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
@@ -30,7 +31,8 @@ enum class Sweep : std::uint8_t {
   joints,        ///< another one
   bias,
   relax,
-  restitution  ///< of manifolds; rows of spheres rebound in the bias and relax sweeps
+  /// Of manifolds; rows of spheres rebound in the bias and relax sweeps. The last sweep of a step.
+  restitution
 };
 
 /// Solves contacts and joints in this order: the overflow (rows without a free color), one after
@@ -52,6 +54,9 @@ class SoftStepSolver {
   /// @param pool not null; outlives the solver
   /// @param simd widest vectors for rows of contacts
   SoftStepSolver(ThreadPool* pool, SimdLevel simd);
+
+  /// Null if bodies are taken one by one.
+  const cpu::BodySweepKernels* body_kernels() const;
 
   /// Builds rows of the contacts and joints whose kind is not kNoRow. Below, "contact" is the
   /// number of a contact or joint; see RowSetup.
@@ -87,7 +92,7 @@ class SoftStepSolver {
     RowTable part_table;  ///< of `parts`, with the cells of `table`
 
     void start(const RowTable::Shape& shape) {
-      table.start(shape);
+      table.start(shape, std::is_same_v<Row, ManifoldRow> ? cpu::kBundle : 1);
       if constexpr (kHasParts<Row>) part_table.start(shape);
     }
     void set_size(std::size_t cell, const Place& count) {
@@ -182,6 +187,9 @@ class SoftStepSolver {
   void sweep_inner(std::size_t block, Sweep sweep);
   void sweep_crossing(Sweep sweep);
   void sweep_overflow(Sweep sweep);
+  cpu::ManifoldSetup manifold_setup();
+  void complete_manifolds();
+  void unpack_manifolds();
   cpu::SphereSweep sphere_sweep();
   cpu::ManifoldSweep manifold_sweep(bool is_fixed);
 
@@ -204,6 +212,12 @@ class SoftStepSolver {
   RowTable::Shape shape_;
   std::atomic<bool> any_rebound_ = false;  ///< whether a restitution sweep has an effect
   RowsOfTypes<RowTypes>::type rows_;
+  // Of rows of manifolds, if they are solved in vectors.
+  std::vector<std::uint8_t> manifold_counts_;  ///< see cpu::ManifoldSetup::counts
+  std::vector<std::uint32_t> first_point_;     ///< see cpu::ManifoldBundles
+  Buffer<cpu::BundleNumbers> bundle_numbers_;
+  Buffer<Real> bundle_rows_, bundle_points_;
+  bool is_packed_ = false;  ///< whether the impulses of the rows are in the bundles
   // Body b of a joint with the world.
   SolverBody world_;
   Mat3 world_inertia_;

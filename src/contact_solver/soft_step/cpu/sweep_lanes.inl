@@ -50,6 +50,31 @@ struct QuadLanes {
   }
 };
 
+/// A Mat3 of each lane.
+template <class S>
+struct Mat3Lanes {
+  using Vec = typename S::Vec;
+  Vec3Lanes<S> row[3];
+
+  static Mat3Lanes load(const Real* all, const std::uint32_t* items) {
+    const auto first = QuadLanes<S>::load(all, kMatrixStride, items);
+    const auto second = QuadLanes<S>::load(all + 4, kMatrixStride, items);
+    const auto last = QuadLanes<S>::load(all + 5, kMatrixStride, items);
+    return {{first.vector,
+             {first.scalar, second.vector.x, second.vector.y},
+             {last.vector.y, last.vector.z, last.scalar}}};
+  }
+  Vec3Lanes<S> operator*(const Vec3Lanes<S>& v) const {
+    return {Vec3Lanes<S>::dot(row[0], v), Vec3Lanes<S>::dot(row[1], v),
+            Vec3Lanes<S>::dot(row[2], v)};
+  }
+  Mat3Lanes transposed() const {
+    return {{{row[0].x, row[1].x, row[2].x},
+             {row[0].y, row[1].y, row[2].y},
+             {row[0].z, row[1].z, row[2].z}}};
+  }
+};
+
 /// Velocities of the bodies of each lane.
 template <class S>
 struct BodyLanes {
@@ -60,7 +85,7 @@ struct BodyLanes {
       : velocity(QuadLanes<S>::load(all + solver_body_quad::kVelocity, kSweepStride, bodies)),
         angular_velocity(
             QuadLanes<S>::load(all + solver_body_quad::kAngularVelocity, kSweepStride, bodies)) {}
-  void store(Real* all, const std::uint32_t* bodies, unsigned lanes) const {
+  [[gnu::always_inline]] void store(Real* all, const std::uint32_t* bodies, unsigned lanes) const {
     velocity.store(all + solver_body_quad::kVelocity, kSweepStride, bodies, lanes);
     angular_velocity.store(all + solver_body_quad::kAngularVelocity, kSweepStride, bodies, lanes);
   }

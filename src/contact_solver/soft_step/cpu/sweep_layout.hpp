@@ -14,6 +14,8 @@ namespace cpu {
 
 /// Reals per SphereRow, per SolverBody and per PointRow.
 inline constexpr std::size_t kSweepStride = 16;
+/// Reals per Mat3.
+inline constexpr std::size_t kMatrixStride = 9;
 
 /// Quadruples of Reals in a SolverBody.
 namespace solver_body_quad {
