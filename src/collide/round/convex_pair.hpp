@@ -191,9 +191,10 @@ struct Simplex {
 };
 
 /// The axis of the largest separation of two solids, of which a is translated by `shift`, if they
-/// are separated. Otherwise an axis that is at least as good as the unit vector `start`.
+/// are separated. Otherwise an axis that is at least as good as the unit vector `start`. Not inlined,
+/// because a device compiler copies it into each of its many callers.
 template <class Pair>
-JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3& start) {
+[[gnu::noinline]] JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3& start) {
   constexpr int kMost = 32;
   Vec3 n = start, best = start;
   Real widest = 0, distance = kMaxReal;
@@ -213,11 +214,12 @@ JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3
 }
 
 /// The point of a that is closest to b when the solids are parted by a clear gap along the axis of
-/// least overlap, in the axes of a.
+/// least overlap, in the axes of a. Rare, hence not inlined.
 /// @param normal     unit, from b to a
 /// @param separation [m], of the axis
 template <class Pair>
-JFPX_HD Vec3 closest_point_of_a(const Pair& pair, const Vec3& normal, Real separation) {
+[[gnu::noinline]] JFPX_HD Vec3 closest_point_of_a(const Pair& pair, const Vec3& normal,
+                                                  Real separation) {
   constexpr int kMost = 32;
   const Real clear = pair.clear_gap();
   const Vec3 shift = separation < clear ? normal * (clear - separation) : Vec3{};

@@ -76,11 +76,12 @@ JFPX_HD void find_contact(const Posed<S>& a, const HalfSpace& wall, const PairMo
   });
 }
 
-/// Two convex solids, by conservative advancement along separating axes.
+/// Two convex solids, by conservative advancement along separating axes. Not inlined, because
+/// several pairs of kinds share it.
 template <class A, class B>
-JFPX_HD void find_contact_of_convex(const ConvexPart<A>& a, const Transform& pose_a,
-                                    const ConvexPart<B>& b, const Transform& pose_b,
-                                    const PairMotion& pair, PairManifold* manifold) {
+[[gnu::noinline]] JFPX_HD void find_contact_of_convex(
+    const ConvexPart<A>& a, const Transform& pose_a, const ConvexPart<B>& b,
+    const Transform& pose_b, const PairMotion& pair, PairManifold* manifold) {
   const Real radii = a.radius + b.radius;
   ConvexPair<A, B> solids{
       a.solid,  b.solid,        transposed(pose_a.basis) * pose_b.basis, {}, a.centre,
@@ -228,12 +229,13 @@ JFPX_HD inline bool place_triangle(const Frustum& frustum, const Mat3& axes,
   return true;
 }
 
-/// A round solid and a triangle of a mesh.
-template <Round S>
-JFPX_HD void find_contact(const Posed<S>& a, const TriangleInstance& b, const PairMotion& pair,
-                          PairManifold* manifold) {
-  const Mat3& axes = a.pose.basis;
-  const Frustum frustum = to_frustum(a.shape);
+/// A frustum and a triangle of a mesh. Not inlined: see find_contact_of_convex().
+[[gnu::noinline]] JFPX_HD inline void find_contact_of_frustum(const Frustum& frustum,
+                                                              const Transform& pose,
+                                                              const TriangleInstance& b,
+                                                              const PairMotion& pair,
+                                                              PairManifold* manifold) {
+  const Mat3& axes = pose.basis;
   FrustumTriangle triangle;
   LeastOverlap widest;
   Real t = 0;
@@ -256,7 +258,12 @@ JFPX_HD void find_contact(const Posed<S>& a, const TriangleInstance& b, const Pa
     visit_contact_points(triangle.pair, ConvexAxes::other, axis, 0, 0, pair.margin, add);
   }
   manifold->normal = axes * axis.normal;
-  add_selected(selection, a.pose, pair.motion * t, pair, manifold);
+  add_selected(selection, pose, pair.motion * t, pair, manifold);
+}
+template <Round S>
+JFPX_HD void find_contact(const Posed<S>& a, const TriangleInstance& b, const PairMotion& pair,
+                          PairManifold* manifold) {
+  find_contact_of_frustum(to_frustum(a.shape), a.pose, b, pair, manifold);
 }
 
 }  // namespace detail
