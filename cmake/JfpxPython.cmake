@@ -20,7 +20,8 @@ if(NOT SKBUILD OR SKBUILD_SABI_VERSION)
 endif()
 find_package(Python 3.10 QUIET COMPONENTS ${components})
 if(NOT Python_FOUND)
-  jfpx_without(python "Python 3.10 or newer with its headers was not found")
+  jfpx_without(python "Python 3.10 or newer with its headers was not found"
+    "On Debian and Ubuntu: sudo apt install python3-dev. Elsewhere, Python_EXECUTABLE may name it.")
 endif()
 execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir
   OUTPUT_VARIABLE nanobind_DIR OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE status)

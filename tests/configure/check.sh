@@ -85,10 +85,16 @@ END
     rm -r "$work/build"
     mkdir "$work/bin"
     ln -s "$(command -v cmake)" "$(command -v ninja)" "$work/bin"
-    if (unset CXX; PATH=$work/bin cmake -B "$work/build" -G Ninja "${common[@]}" >"$work/log" 2>&1); then
+    unset CXX
+    if PATH=$work/bin cmake -B "$work/build" -G Ninja "${common[@]}" >"$work/log" 2>&1; then
       fail "accepted: no compiler"
     fi
     said "No C++ compiler was found on PATH" && said "sudo apt install g++." || fail "$(cat "$work/log")"
+    if CXX="no-such-g++ -m64" cmake -B "$work/build" -G Ninja "${common[@]}" >"$work/log" 2>&1; then
+      fail "accepted: a compiler that is missing"
+    fi
+    said 'The C++ compiler "no-such-g++ -m64", which CXX names, was not found on PATH' && said "sudo apt install g++." ||
+      fail "$(cat "$work/log")"
     ;;
   # pip compiles for the GPUs of the machine, where nvcc supports them.
   gpu)
