@@ -821,8 +821,9 @@ def run_code_of(document):
     return names
 
 
-def test_the_code_of_the_readme_runs():
-    names = run_code_of("README.md")
+@pytest.mark.parametrize("document", ["README.md", "python/README.md"])
+def test_the_code_of_the_readme_runs(document):
+    names = run_code_of(document)
     assert names["pairs"].shape[1] > 0 and names["world"].report.step == 600
 
 
