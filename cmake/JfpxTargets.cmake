@@ -21,7 +21,9 @@ target_compile_options(jfpx_warnings INTERFACE
 add_library(jfpx_build_flags INTERFACE)
 target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)
 target_include_directories(jfpx_build_flags INTERFACE ${PROJECT_SOURCE_DIR})
-target_compile_options(jfpx_build_flags INTERFACE ${JFPX_OWN_EXACT_FLAGS})
+target_compile_options(jfpx_build_flags INTERFACE ${JFPX_OWN_EXACT_FLAGS}
+  # Errors of CUDA name their source file, without the folder in which it was compiled.
+  $<$<AND:$<COMPILE_LANG_AND_ID:CXX,GNU,Clang,AppleClang>,$<NOT:$<BOOL:${MSVC}>>>:-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=>)
 target_link_libraries(jfpx_build_flags INTERFACE jfpx_warnings)
 
 # jfpx_add_library(NAME [STATIC|OBJECT] SOURCES ... [PUBLIC ...] [PRIVATE ...]): adds NAME and NAME_f64. Where
