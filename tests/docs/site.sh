@@ -3,7 +3,7 @@
 # Its search has guides, C++ and Python.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-command -v doxygen >/dev/null && [ -x build/docs/venv/bin/sphinx-build ] ||
+command -v doxygen >/dev/null && [ -e build/docs/venv/installed ] ||
   { echo "skipped: Doxygen or Sphinx is missing (scripts/setup docs)"; exit 0; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
