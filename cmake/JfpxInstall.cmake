@@ -1,6 +1,6 @@
 # Installation of libraries with their CMake and pkg-config files, headers and programs. The installation is
 # relocatable: no file contains the prefix. Components follow Debian's conventions: runtime, runtime_thesis,
-# runtime_bullet, dev, tools.
+# runtime_bullet, dev, tools, doc.
 if(JFPX_INSTALL)
   foreach(folder IN ITEMS BINDIR LIBDIR INCLUDEDIR)
     if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
@@ -147,4 +147,20 @@ install(FILES
   ${PROJECT_BINARY_DIR}/jfpx-config.cmake ${PROJECT_BINARY_DIR}/jfpx-config-version.cmake
   cmake/JfpxFindBullet.cmake
   DESTINATION ${JFPX_CMAKE_FOLDER} COMPONENT dev)
-install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT dev)
+
+# Documents, with all files to which they have links, in the folders of the repository. Sources of packages may lack them.
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc)
+if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/docs)
+  install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+    DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc
+    FILES_MATCHING PATTERN *.md PATTERN images/* PATTERN reference EXCLUDE PATTERN site EXCLUDE)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/bench/results DESTINATION ${CMAKE_INSTALL_DOCDIR}/bench COMPONENT doc)
+  install(FILES ${PROJECT_SOURCE_DIR}/bench/python/neighbours.py
+    DESTINATION ${CMAKE_INSTALL_DOCDIR}/bench/python COMPONENT doc)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc
+    PATTERN __pycache__ EXCLUDE)
+  install(FILES ${PROJECT_SOURCE_DIR}/packaging/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/packaging COMPONENT doc)
+  # The site, if scripts/docs has built it.
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/build/docs/html DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc OPTIONAL)
+endif()

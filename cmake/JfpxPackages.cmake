@@ -20,7 +20,7 @@ set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 # The libraries of jfpx are not installed while packages are created.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/src ${PROJECT_BINARY_DIR}/src/bullet)
 
-set(CPACK_COMPONENTS_ALL dev)
+set(CPACK_COMPONENTS_ALL dev doc)
 set(libraries "")
 if(BUILD_SHARED_LIBS)
   list(APPEND CPACK_COMPONENTS_ALL runtime runtime_thesis)
@@ -63,4 +63,9 @@ if(JFPX_HAS_VIEWER)
 endif()
 _jfpx_describe_package(tools jfpx-tools science "${libraries}" "commands of jfpx: run, compare, replay, view scenes"
   "${text} Also runs unmodified Bullet programs with it: jfpx preload.")
+_jfpx_describe_package(doc jfpx-doc doc "" "rigid-body collision with the same bits everywhere: documents"
+  "Guides, examples, measurements, and the HTML site of the documentation where it was built.")
+set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_DEV_PACKAGE_SUGGESTS jfpx-doc)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS jfpx-doc)
 include(CPack)

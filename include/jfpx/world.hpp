@@ -48,6 +48,7 @@ struct WorldSettings {
 ///   - a sphere and a box, half-space or plane: the sphere;
 ///   - only one body is movable (has a mass other than 0): that body;
 ///   - otherwise: the body with the lower index.
+///
 /// A contact of a contact generator has the bodies, the point and the direction of the normal of
 /// its GeneratedContact.
 struct Contact {

@@ -19,6 +19,7 @@ from ._nearest import Nearest, PeriodicNearest, find_nearest
 from ._neighbors import Neighbors, find_neighbors
 from ._recording import Recording, RecordingWriter, TrajectoryWriter
 from ._scene import Scene, scene_names
+from ._view import View
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
                      WorldContacts)
 
@@ -32,6 +33,6 @@ __all__ = [
     "InvalidSnapshot", "JointId", "JointState", "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows",
     "PeriodicContacts", "PeriodicNearest", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
     "RecordingWriter", "Rows", "STAY", "Scene", "SliderJoint", "SphereCollider", "Spring",
-    "States", "StepReport", "TrajectoryWriter", "WheelJoint", "World", "WorldContacts", "available_backends",
+    "States", "StepReport", "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends",
     "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "scene_names",
 ]

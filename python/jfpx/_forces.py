@@ -103,8 +103,8 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Drag:
-    """Drag -(linear + quadratic * |u|) * u on one body or on all, where u is the velocity relative
-    to the wind [m/s]; linear [kg/s] >= 0, quadratic [kg/m] >= 0, all finite."""
+    """Drag -(linear + quadratic * s) * u on one body or on all, where u is the velocity relative to
+    the wind [m/s], and s its magnitude; linear [kg/s] >= 0, quadratic [kg/m] >= 0, all finite."""
 
     linear: float = 0.0
     quadratic: float = 0.0

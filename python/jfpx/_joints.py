@@ -100,15 +100,27 @@ class DistanceJoint(_Joint):
     a rope, if min_length is 0. Between the limits, a spring may act. World.add_joint() checks the
     fields, and raises InvalidArgument.
 
-    a : body; b : another body, or None for the world; one of them movable
-    anchor_a, anchor_b : points of the bodies in body axes, from the centre of mass; of the world,
-    its coordinates [m]
-    min_length, max_length : [m], 0 <= min_length <= max_length <= 1e9
-    rest_length : [m] >= 0, of the spring
-    hertz : [Hz] from 0 to 1e6, frequency of the spring; 0: none
-    damping_ratio : from 0 to 1000, of the spring; 1: critical
-    collide_connected : whether the two bodies have contacts with each other
-    user_data : whole number up to 2**64 - 1, for the program
+    Attributes
+    ----------
+    a : BodyId
+        A body.
+    b : BodyId or None
+        Another body, or None for the world; a or b is movable.
+    anchor_a, anchor_b : three numbers
+        Points of the bodies in body axes, from the centre of mass; of the world, its coordinates
+        [m].
+    min_length, max_length : float
+        [m], 0 <= min_length <= max_length <= 1e9.
+    rest_length : float
+        [m] >= 0, of the spring.
+    hertz : float
+        [Hz] from 0 to 1e6, frequency of the spring; 0: none.
+    damping_ratio : float
+        From 0 to 1000, of the spring; 1: critical.
+    collide_connected : bool
+        Whether the two bodies have contacts with each other.
+    user_data : int
+        Whole number up to 2**64 - 1, for the program.
     """
 
     a: BodyId
@@ -130,15 +142,23 @@ class DistanceJoint(_Joint):
 class BallJoint(_Joint):
     """Holds two points of two bodies together: three rotations stay free.
 
-    a, b, anchor_a, anchor_b, collide_connected, user_data : as in DistanceJoint
-    axes_a, axes_b : unit quaternions (w, x, y, z), from joint axes to the axes of the bodies; the
-    angles are 0 when the joint axes coincide, and x is the twist axis
-    cone_angle : [rad] from 0 to pi, largest angle between the x axes; pi: free
-    min_twist, max_twist : [rad] from -pi to pi, of a about x; both: free,
-    otherwise pi is a limit, too
-    hertz : [Hz] from 0 to 1e6, of a spring to all angles 0; 0: none
-    damping_ratio : from 0 to 1000, of the spring
-    friction_torque : [N m] from 0 to 1e9, largest torque against rotation
+    Attributes
+    ----------
+    a, b, anchor_a, anchor_b, collide_connected, user_data
+        As in DistanceJoint.
+    axes_a, axes_b : four numbers
+        Unit quaternions (w, x, y, z), from joint axes to the axes of the bodies; the angles are 0
+        when the joint axes coincide, and x is the twist axis.
+    cone_angle : float
+        [rad] from 0 to pi, largest angle between the x axes; pi: free.
+    min_twist, max_twist : float
+        [rad] from -pi to pi, of a about x; both: free, otherwise pi is a limit, too.
+    hertz : float
+        [Hz] from 0 to 1e6, of a spring to all angles 0; 0: none.
+    damping_ratio : float
+        From 0 to 1000, of the spring.
+    friction_torque : float
+        [N m] from 0 to 1e9, largest torque against rotation.
     """
 
     a: BodyId
@@ -163,13 +183,20 @@ class BallJoint(_Joint):
 class HingeJoint(_Joint):
     """Lets body a rotate relative to b about the x axis of the joint only.
 
-    min_angle, max_angle : [rad] from -pi to pi, of a about x; both: free,
-    otherwise pi is a limit, too
-    target_angle : [rad] from -pi to pi, of the spring
-    hertz, damping_ratio : of the spring, as in BallJoint
-    motor_speed : [rad/s], of a about x
-    max_motor_torque : [N m] from 0 to 1e9; 0: no motor; with speed 0: a brake
     The other fields are those of BallJoint.
+
+    Attributes
+    ----------
+    min_angle, max_angle : float
+        [rad] from -pi to pi, of a about x; both: free, otherwise pi is a limit, too.
+    target_angle : float
+        [rad] from -pi to pi, of the spring.
+    hertz, damping_ratio : float
+        Of the spring, as in BallJoint.
+    motor_speed : float
+        [rad/s], of a about x.
+    max_motor_torque : float
+        [N m] from 0 to 1e9; 0: no motor; with speed 0: a brake.
     """
 
     a: BodyId
@@ -195,12 +222,20 @@ class HingeJoint(_Joint):
 class SliderJoint(_Joint):
     """Lets body a move relative to b along the x axis of the joint only, without rotation.
 
-    min_position, max_position : [m] from -1e9 to 1e9, of a's anchor along x
-    target_position : [m], of the spring
-    hertz, damping_ratio : of the spring, as in BallJoint
-    motor_speed : [m/s], of a along x
-    max_motor_force : [N] from 0 to 1e9; 0: no motor; with speed 0: a brake
     The other fields are those of BallJoint.
+
+    Attributes
+    ----------
+    min_position, max_position : float
+        [m] from -1e9 to 1e9, of a's anchor along x.
+    target_position : float
+        [m], of the spring.
+    hertz, damping_ratio : float
+        Of the spring, as in BallJoint.
+    motor_speed : float
+        [m/s], of a along x.
+    max_motor_force : float
+        [N] from 0 to 1e9; 0: no motor; with speed 0: a brake.
     """
 
     a: BodyId
@@ -226,9 +261,14 @@ class SliderJoint(_Joint):
 class FixedJoint(_Joint):
     """Keeps two bodies in the relative pose in which their joint frames coincide.
 
-    linear_hertz, angular_hertz : [Hz] from 0 to 1e6, of springs that hold points and axes; 0: rigid
-    damping_ratio : from 0 to 1000, of the springs
     The other fields are those of BallJoint.
+
+    Attributes
+    ----------
+    linear_hertz, angular_hertz : float
+        [Hz] from 0 to 1e6, of springs that hold points and axes; 0: rigid.
+    damping_ratio : float
+        From 0 to 1000, of the springs.
     """
 
     a: BodyId
@@ -251,12 +291,20 @@ class WheelJoint(_Joint):
     """A wheel a on a vehicle b: rotates about the x axis of the joint, and moves along its y axis,
     the direction of the suspension.
 
-    min_position, max_position : [m] from -1e9 to 1e9, of the wheel along y
-    hertz, damping_ratio : of the suspension to position 0, as in BallJoint
-    steering_angle : [rad] from -pi to pi, about y
-    motor_speed : [rad/s], of the wheel about x
-    max_motor_torque : [N m] from 0 to 1e9; 0: no motor; with speed 0: a brake
     The other fields are those of BallJoint.
+
+    Attributes
+    ----------
+    min_position, max_position : float
+        [m] from -1e9 to 1e9, of the wheel along y.
+    hertz, damping_ratio : float
+        Of the suspension to position 0, as in BallJoint.
+    steering_angle : float
+        [rad] from -pi to pi, about y.
+    motor_speed : float
+        [rad/s], of the wheel about x.
+    max_motor_torque : float
+        [N m] from 0 to 1e9; 0: no motor; with speed 0: a brake.
     """
 
     a: BodyId

@@ -11,6 +11,7 @@ from . import _arrays, _core
 from ._errors import InvalidArgument
 from ._forces import States
 from ._scene import Scene
+from ._view import View
 from ._world import World
 
 _Self = TypeVar("_Self", bound="_FileWriter")
@@ -207,6 +208,27 @@ class Recording:
     def __len__(self) -> int:
         """Number of steps."""
         return self._reader.steps
+
+    def view(self, *, every: int = 1, height: int = 480) -> View:
+        """A picture of the run in 3D, which notebooks play with a slider and View.save() writes as an
+        HTML file. A frame takes about 15 bytes a body in a file, and less for bodies at rest.
+
+        Parameters
+        ----------
+        every : int in [1, len(self)]
+            A frame is shown for each of so many steps.
+        height : int in [50, 10000]
+            Height in a notebook, in pixels.
+
+        Raises
+        ------
+        InvalidArgument, FileError
+            As states(); or a number is out of its range.
+        """
+        every = _arrays.count(every, "every", 1, max(len(self), 1))
+        scene = self.scene
+        states = [self.states(step) for step in range(every, len(self) + 1, every)]
+        return scene.view(states or None, interval=every * scene.dt, height=height)
 
     def states(self, step: int) -> States:
         """States after a step, as new arrays (N, 3) and (N, 4) of `dtype`, in the order of the

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _arrays, _core
 from ._errors import InvalidArgument, InvalidScene
+from ._view import View, view_of_scene
 
 
 class Scene:
@@ -310,6 +311,33 @@ class Scene:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a JSON file: the path has the complete file or is unchanged. Raises FileError."""
         self._scene.save(_arrays.path(path))
+
+    def view(self, states: Any = None, *, interval: float | None = None, height: int = 480) -> View:
+        """A picture of the bodies in 3D for notebooks, which View.save() writes as an HTML file. A list
+        of states is played with a slider::
+
+            states = []
+            for _ in range(300):
+                world.step()
+                states.append(world.states())
+            world.scene.view(states)
+
+        Parameters
+        ----------
+        states : list of States, or array (F, N, 3), optional
+            Frames, with a row for each body of the scene; an array has positions [m] alone. The
+            initial state if absent.
+        interval : number, optional
+            Seconds between two frames; `dt` if absent.
+        height : int in [50, 10000]
+            Height in a notebook, in pixels.
+
+        Raises
+        ------
+        InvalidArgument
+            An array has a wrong shape or type, `states` is empty, or a number is out of its range.
+        """
+        return view_of_scene(self, states, interval, height)
 
     def __eq__(self, other: object) -> bool:
         """Whether dtype and all fields are equal."""

@@ -14,6 +14,7 @@ from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._joints import JointId, JointState, arguments, joint_of
 from ._scene import Scene, no_gravity
+from ._view import View, view_of_world
 
 
 class StepReport(NamedTuple):
@@ -251,6 +252,7 @@ class World:
         self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device}
         self._device = device
         self._report: StepReport | None = None
+        self._followers: list[Callable[[], None]] = []  # called after each step
 
     def __reduce__(self) -> Any:
         """The scene, the options and a snapshot: pickle and copy.deepcopy() make a world that
@@ -278,6 +280,8 @@ class World:
         ConcurrentUse, Closed
         """
         self._report = _report(self._core.step())
+        for follower in self._followers:
+            follower()
         return self._report
 
     def run(self, steps: int, *, after_step: Callable[[StepReport], Any] | None = None) -> StepReport:
@@ -303,13 +307,15 @@ class World:
             As step(). The steps before are kept.
         """
         steps = _arrays.count(steps, "steps", 1, 2**63 - 1)
-        if after_step is None:
+        if after_step is None and not self._followers:
             self._report = _report(self._core.run(steps))
             return self._report
-        _arrays.function(after_step, "after_step")
+        if after_step is not None:
+            _arrays.function(after_step, "after_step")
         for _ in range(steps):
             report = self.step()
-            after_step(report)
+            if after_step is not None:
+                after_step(report)
             if report.non_finite:
                 break
         return report
@@ -905,6 +911,23 @@ class World:
                                            _arrays.triple(centre, "centre"),
                                            _arrays.triple(orientation, "orientation", 4))
         return [BodyId(*body) for body in found]
+
+    def view(self, *, height: int = 480) -> View:
+        """A picture of the bodies in 3D for notebooks, which View.update() and View.follow() bring up
+        to date, and which View.save() writes as an HTML file.
+
+        Parameters
+        ----------
+        height : int in [50, 10000]
+            Height in a notebook, in pixels.
+
+        Raises
+        ------
+        InvalidArgument
+            `height` is out of its range.
+        OutOfMemory, DeviceError
+        """
+        return view_of_world(self, height)
 
     def _rows(self, size: int) -> np.ndarray:
         return np.empty((size, 3), self._dtype)

@@ -9,6 +9,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <memory>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -113,6 +114,15 @@ inline std::vector<PeriodicCell> to_cells(const Rows<const double>& lengths) {
   }
   return cells;
 }
+/// An array (N, columns) that owns the memory of a vector.
+template <class Scalar, class Item>
+nb::ndarray<nb::numpy, Scalar> own(std::vector<Item>&& items) {
+  auto kept = std::make_unique<std::vector<Item>>(std::move(items));
+  const nb::capsule owner(kept.get(),
+                          [](void* p) noexcept { delete static_cast<std::vector<Item>*>(p); });
+  const std::vector<Item>& vector = *kept.release();
+  return {const_cast<Item*>(vector.data()), {vector.size(), sizeof(Item) / sizeof(Scalar)}, owner};
+}
 inline void set_row(const Rows<Real>& rows, std::size_t i, const Vec3& v) {
   rows(i, 0) = v.x;
   rows(i, 1) = v.y;
@@ -125,6 +135,15 @@ struct StateArrays {
 };
 /// @throws InvalidArgument if an array does not have a row for each state
 void fill(const StateArrays& arrays, std::span<const BodyState> states);
+
+/// Bodies in their order, for pictures: shape and mass of each.
+struct ShownBody {
+  const Shape* shape = nullptr;
+  Real mass = 0;
+  Vec3 acceleration;  ///< BodyDef::acceleration
+};
+/// The solids, walls and meshes of bodies as arrays: jfpx._view.Geometry.
+nb::tuple geometry_of(std::span<const ShownBody> bodies);
 
 /// Options of a collider by their names in Python.
 /// @throws InvalidArgument for an unknown name

@@ -1,22 +1,10 @@
 /// Binding of neighbor lists.
 #include "python/src/bindings.hpp"
 
-#include <memory>
-
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace python {
 namespace {
-
-/// An array (N, columns) that owns the memory of a vector.
-template <class Scalar, class Item>
-nb::ndarray<nb::numpy, Scalar> own(std::vector<Item>&& items) {
-  auto kept = std::make_unique<std::vector<Item>>(std::move(items));
-  const nb::capsule owner(kept.get(),
-                          [](void* p) noexcept { delete static_cast<std::vector<Item>*>(p); });
-  const std::vector<Item>& vector = *kept.release();
-  return {const_cast<Item*>(vector.data()), {vector.size(), sizeof(Item) / sizeof(Scalar)}, owner};
-}
 
 /// The cells of vectors (3 C, 3) and flags (C, 3).
 std::vector<TriclinicCell> to_triclinic(const Rows<const double>& vectors,

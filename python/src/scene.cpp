@@ -92,6 +92,24 @@ void bind_scene(nb::module_& module) {
              validate(grown);
              self = std::move(grown);
            })
+      .def("geometry",
+           [](const Scene& self) {
+             std::vector<ShownBody> bodies;
+             bodies.reserve(self.bodies.size());
+             for (const BodyDef& body : self.bodies) {
+               bodies.push_back({&body.shape, body.mass, body.acceleration});
+             }
+             return geometry_of(bodies);
+           })
+      .def("write_poses",
+           [](const Scene& self, const Rows<Real>& positions, const Rows<Real>& orientations) {
+             for (std::size_t i = 0; i < self.bodies.size(); ++i) {
+               set_row(positions, i, self.bodies[i].position);
+               const Quat& q = self.bodies[i].orientation;
+               const std::array<Real, 4> row{q.w, q.x, q.y, q.z};
+               for (std::size_t k = 0; k < 4; ++k) orientations(i, k) = row[k];
+             }
+           })
       .def_prop_ro("name", [](const Scene& self) { return self.name; })
       .def_prop_ro("dt", [](const Scene& self) { return static_cast<double>(self.dt); })
       .def_prop_ro("bodies", [](const Scene& self) { return self.bodies.size(); })

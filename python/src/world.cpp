@@ -113,6 +113,22 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
 
 void bind_properties(nb::class_<PythonWorld>& world) {
   world
+      .def("geometry",
+           [](const PythonWorld& self) {
+             const World& shown = self.get();
+             std::vector<ShownBody> bodies;
+             bodies.reserve(shown.bodies().size());
+             for (const BodyId id : shown.bodies()) {
+               bodies.push_back({&shown.shape(id), shown.mass(id), shown.acceleration(id)});
+             }
+             return geometry_of(bodies);
+           })
+      .def("write_awake",
+           [](const PythonWorld& self, const Vector<std::uint8_t>& awake) {
+             const World& shown = self.get();
+             std::size_t row = 0;
+             for (const BodyId id : shown.bodies()) awake(row++) = shown.awake(id) ? 1 : 0;
+           })
       .def("awake", [](const PythonWorld& self, IdTuple id) { return self.get().awake(to_id(id)); })
       .def("wake", [](PythonWorld& self, IdTuple id) { self.get().wake(to_id(id)); })
       .def("mass", [](const PythonWorld& self, IdTuple id) { return self.get().mass(to_id(id)); })

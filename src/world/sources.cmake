@@ -41,6 +41,11 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/world_snapshot.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_state.cpp)
 list(APPEND JFPX_CUDA_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/block_solve_programs.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/contact_programs.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/row_programs.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/shape_programs.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/solve_programs.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/world_cuda.cu)
 # Has private names of recording/recording.cpp.
 set_source_files_properties(${CMAKE_CURRENT_LIST_DIR}/snapshots/snapshot_file.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

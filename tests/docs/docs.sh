@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # What documents say of the rest of the project is so. Every test that they name exists: as
 # `Suite.Name`, `Suite.Begins*`, `file_test.cpp` or, in Python, `test_name`. Every link leads somewhere. Every C++ snippet, and
-# every line that a diff adds, is in the examples, which are compiled and run. docs/scenes.md has every
+# every line that a diff adds, is in the examples, which are compiled and run. docs/reference has every public name. docs/scenes.md has every
 # field of a scene. docs/thesis.md leaves out no row of the census (1 to 224) and no erratum (E1 to E58).
 set -u
 cd "$(dirname "$0")/../.."
@@ -30,10 +30,14 @@ while read -r name; do
   grep -rqE "^def $name\(" tests/python || complain "no such test: $name"
 done < <(grep -rhoE '`test_[a-z0-9_]+`' docs README.md | tr -d '`' | sort -u)
 
-# The targets of links, with "#..." and addresses of the web left out.
-while IFS=: read -r document target; do
-  [ -e "$(dirname "$document")/$target" ] || complain "$document: no such file: $target"
-done < <(grep -oE '\]\([^)#:]+' README.md docs/*.md | sed 's/](//')
+tests/docs/links.sh README.md CHANGELOG.md packaging/README.md docs/*.md docs/reference/*.md bench/results/*.md || status=1
+
+# The reference has every public header and every name of the Python package, once.
+diff <(cd include && find jfpx -name '*.hpp' | sort) <(cat docs/reference/cpp_*.md | sed -n 's/^## \(jfpx.*\)/\1/p' | sort) ||
+  complain "docs/reference/cpp_*.md (>) do not have the headers of include (<)"
+diff <(sed -n '/^__all__/,$p' python/jfpx/__init__.py | grep -oE '"[A-Za-z_]+"' | tr -d '"' | sort) \
+  <(cat docs/reference/python_*.md | sed -n 's/^\.\. auto[a-z]*:: jfpx\.//p' | sort) ||
+  complain "docs/reference/python_*.md (>) do not have the names of the Python package (<)"
 
 # Words with one space between them, so that indentation and line breaks do not matter.
 flatten() { tr -s ' \n\t' ' '; }

@@ -6,4 +6,4 @@ command -v doxygen >/dev/null || { echo "skipped: doxygen is not installed"; exi
 output=$(mktemp -d)
 trap 'rm -rf "$output"' EXIT
 { cat docs/Doxyfile; echo "OUTPUT_DIRECTORY = $output"; } | doxygen - >/dev/null
-[ -s "$output/html/index.html" ] || { echo "doxygen wrote nothing" >&2; exit 1; }
+[ -s "$output/xml/index.xml" ] || { echo "doxygen wrote nothing" >&2; exit 1; }

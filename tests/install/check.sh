@@ -139,6 +139,14 @@ refused" ] || fail "$("$work/cmake/both")"
     refused "jfpx::v0_99_f32::make_sphere_collider" -I"$work/newer"
     refused "LibraryUsesSameCompilerSwitches" -D_GLIBCXX_DEBUG
     ;;
+  # Each link of an installed document leads to an installed file, also where nothing but the documents is.
+  documents)
+    rm -rf "$work/documents"
+    cmake --install "$build" --component doc --prefix "$work/documents" >/dev/null
+    folder=$(dirname "$(find "$work/documents" -name README.md -path '*/jfpx/README.md')")
+    [ -s "$folder/docs/world.md" ] && [ -s "$folder/LICENSE" ] || fail "documents are missing in $work/documents"
+    find "$folder" -path "$folder/html" -prune -o -name '*.md' -print0 | xargs -0 "$root/tests/docs/links.sh"
+    ;;
   # Shared libraries export what is jfpx's, and need nothing of CUDA. Static ones become shared to see.
   symbols)
     if [ "$KIND" = static ]; then
@@ -206,6 +214,9 @@ refused" ] || fail "$("$work/cmake/both")"
       ! depends libjfpx0.2 | grep -q bullet || fail "libjfpx0.2 depends on Bullet"
     fi
     [ -s "$work/root/usr/share/doc/libjfpx0.2/copyright" ] || fail "no copyright"
+    [ -s "$work/root/usr/share/doc/jfpx/docs/world.md" ] || fail "no documents"
+    [ "$(depends jfpx-doc Architecture)" = all ] || fail "jfpx-doc is for $(depends jfpx-doc Architecture)"
+    ! dpkg-deb -c "$work"/packages/libjfpx-dev_*.deb | grep -q README || fail "libjfpx-dev has documents"
     prefix=$work/root/usr
     "$prefix/bin/jfpx" run pile --spheres 64 --steps 10 --precision double --hash | grep -E '^[0-9a-f]{16}$' || fail "jfpx run"
     if [ "$HAS_BULLET" = ON ]; then

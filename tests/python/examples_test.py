@@ -37,6 +37,12 @@ def test_an_example_runs_and_draws_its_picture(tmp_path, name, arguments, text):
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_run_is_saved_as_a_page(tmp_path):
+    page = tmp_path / "run.html"
+    assert "161 bodies, 11 frames>" in run("view.py", "--steps", "20", "--save", page)
+    assert page.read_text().startswith("<!DOCTYPE html>")
+
+
 def test_forces_by_torch_are_the_differences_of_the_energy():
     pytest.importorskip("torch")
     assert "forces are the differences of the energy\npressure without motion: " in run("lennard_jones.py")

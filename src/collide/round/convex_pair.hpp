@@ -191,10 +191,11 @@ struct Simplex {
 };
 
 /// The axis of the largest separation of two solids, of which a is translated by `shift`, if they
-/// are separated. Otherwise an axis that is at least as good as the unit vector `start`. Not inlined,
-/// because a device compiler copies it into each of its many callers.
+/// are separated. Otherwise an axis that is at least as good as the unit vector `start`. Not
+/// inlined, because a device compiler copies it into each of its many callers.
 template <class Pair>
-[[gnu::noinline]] JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift, const Vec3& start) {
+[[gnu::noinline]] JFPX_HD Vec3 widest_of_separated(const Pair& pair, const Vec3& shift,
+                                                   const Vec3& start) {
   constexpr int kMost = 32;
   Vec3 n = start, best = start;
   Real widest = 0, distance = kMaxReal;

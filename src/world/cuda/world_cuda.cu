@@ -1,10 +1,12 @@
-/// The world on a CUDA device: launches of the programs of a step.
+/// The world on a CUDA device: launches of the programs of a step. Their kernels are compiled in
+/// files of their own (program_kernel.hpp).
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/device_code.hpp"
 #include "src/base/cuda/ordering_event.hpp"
 #include "src/base/parallel_for.hpp"
 #include "src/sphere_collider/cuda/device_search.hpp"
 #include "src/world/cuda/grid_team.cuh"
+#include "src/world/cuda/program_kernel.hpp"
 #include "src/world/cuda/world_cuda.hpp"
 #include "src/world/device/device_step.hpp"
 
@@ -21,12 +23,6 @@ namespace cuda {
 namespace {
 
 namespace tuning = device::tuning;
-
-template <class Program>
-__global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerMultiprocessor)
-    run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster) {
-  program(GridTeam(scratch, is_cluster));
-}
 
 /// The stream, the memory and the launches of a DeviceStep.
 class CudaDevice {
@@ -139,7 +135,7 @@ class CudaDevice {
     if (limits.has_clusters && blocks <= 2 * tuning::kClusterBlocks) {
       blocks = std::min(blocks, tuning::kClusterBlocks);
     }
-    const bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= tuning::kClusterBlocks;
+    bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= tuning::kClusterBlocks;
     cudaLaunchAttribute attribute{};
     if (is_cluster) {
       attribute.id = cudaLaunchAttributeClusterDimension;
@@ -155,8 +151,9 @@ class CudaDevice {
     config.stream = target_;
     config.attrs = &attribute;
     config.numAttrs = 1;
-    JFPX_CUDA_TRY(
-        cudaLaunchKernelEx(&config, run_program<Program>, program, scratch_.data(), is_cluster));
+    std::uint32_t* scratch = scratch_.data();
+    void* arguments[] = {const_cast<Program*>(&program), &scratch, &is_cluster};
+    JFPX_CUDA_TRY(cudaLaunchKernelExC(&config, program_kernel<Program>(), arguments));
   }
 
   void wait() {
@@ -228,6 +225,7 @@ class CudaDevice {
     static_assert(Program::kBlocksPerMultiprocessor <= tuning::kMost);
     Launch& limits = std::get<Limits<Program>>(limits_);
     if (limits.most_blocks > 0) return limits;
+    const void* const kernel = program_kernel<Program>();
     int resident = 0;
     constexpr std::size_t kShared = shared_bytes<Program>();
     int most_shared = 0;
@@ -239,15 +237,14 @@ class CudaDevice {
           " movable bodies needs " + std::to_string(kShared + kStaticShared) +
           " bytes of shared memory for a block; this GPU has " + std::to_string(most_shared));
     }
-    JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
-                                       cudaFuncAttributeMaxDynamicSharedMemorySize,
+    JFPX_CUDA_TRY(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                        static_cast<int>(kShared)));
-    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, run_program<Program>,
+    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, kernel,
                                                                 GridTeam::kThreads, kShared));
     limits.has_clusters = has_hopper_code();
     if (limits.has_clusters) {
-      JFPX_CUDA_TRY(cudaFuncSetAttribute(run_program<Program>,
-                                         cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
+      JFPX_CUDA_TRY(
+          cudaFuncSetAttribute(kernel, cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
     }
     limits.most_blocks =
         std::min<std::size_t>(static_cast<unsigned>(resident), Program::kBlocksPerMultiprocessor) *
