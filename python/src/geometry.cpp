@@ -1,5 +1,6 @@
 /// Geometry of bodies as arrays, for pictures.
 #include "python/src/bindings.hpp"
+#include "src/collide/hull/triangles.hpp"
 #include "src/collide/solid.hpp"
 
 #include <map>
@@ -10,23 +11,15 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-/// Index of a type in Shape, which also is the number of a shape in a trajectory.
-template <class S, std::size_t i = 0>
-constexpr std::uint8_t kind_of() {
-  if constexpr (std::is_same_v<S, std::variant_alternative_t<i, Shape>>) {
-    return i;
-  } else {
-    return kind_of<S, i + 1>();
-  }
-}
-
 /// Collects solids, and each hull and mesh once.
 class GeometryBuilder {
  public:
   void add(std::uint32_t body, const Shape& shape) {
     detail::for_each_part(shape, [&](const auto& part, const CompoundPart* pose, std::uint32_t) {
       bodies_.push_back({body});
-      kinds_.push_back({kind_of<std::decay_t<decltype(part)>>()});
+      // Also the number of the shape in a trajectory.
+      using Kind = std::decay_t<decltype(part)>;
+      kinds_.push_back({detail::KindsOf<Shape>::index_of<Kind>()});
       sizes_.push_back(size_of(part));
       const Vec3 p = pose != nullptr ? pose->position : Vec3{};
       const Quat q = pose != nullptr ? pose->orientation : Quat{};
@@ -54,16 +47,8 @@ class GeometryBuilder {
   static Size size_of(const HalfSpace& s) { return {s.normal.x, s.normal.y, s.normal.z, s.offset}; }
   static Size size_of(const Plane& s) { return {s.normal.x, s.normal.y, s.normal.z, s.offset}; }
   Size size_of(const Hull& hull) {
-    return numbered(&hull.data(), [&] {
-      std::vector<Triangle> triangles;
-      for (const HullFace& face : hull.faces()) {
-        const auto corners = hull.corners(face);
-        for (std::size_t k = 2; k < corners.size(); ++k) {
-          triangles.push_back({corners[0], corners[k - 1], corners[k]});
-        }
-      }
-      add_mesh(hull.vertices(), std::move(triangles), false);
-    });
+    return numbered(&hull.data(),
+                    [&] { add_mesh(hull.vertices(), detail::triangles_of(hull), false); });
   }
   Size size_of(const TriangleMesh& mesh) {
     return numbered(mesh.data().get(), [&] { add_mesh(mesh); });

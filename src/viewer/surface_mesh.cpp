@@ -1,6 +1,7 @@
 /// Triangulation of hulls, round solids and heightfields.
 #include "src/viewer/surface_mesh.hpp"
 
+#include "src/collide/hull/triangles.hpp"
 #include "src/collide/shapes.hpp"
 
 #include <array>
@@ -23,13 +24,8 @@ TriangleMesh mesh_of(const Hull& hull) {
   const std::lock_guard lock(mutex);
   TriangleMesh& mesh = meshes[hull.data().view.serial];
   if (mesh.data() != nullptr) return mesh;
-  TriangleMeshDef def{{hull.vertices().begin(), hull.vertices().end()}, {}, false};
-  for (const HullFace& face : hull.faces()) {
-    const auto corners = hull.corners(face);
-    for (std::size_t k = 2; k < corners.size(); ++k) {
-      def.triangles.push_back({corners[0], corners[k - 1], corners[k]});
-    }
-  }
+  TriangleMeshDef def{
+      {hull.vertices().begin(), hull.vertices().end()}, jfpx::detail::triangles_of(hull), false};
   return mesh = TriangleMesh(std::move(def));
 }
 
