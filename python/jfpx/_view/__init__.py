@@ -34,14 +34,14 @@ class View:
     """
 
     def __init__(self, core: Any, frames: Sequence[Frame] | None, *, interval: float, height: int,
-                 title: str) -> None:
+                 title: str, world: Any = None) -> None:
         self._core = core
+        self._world = world  # whose present state is shown, if there are no frames
         self._frames = frames
         self._interval = interval
         self._height = height
         self._title = title
         self._widget: Any = None
-        self._followed: Any = None
         self._bodies: Any = None
         self._read_scene(frames[0] if frames else self._now())
 
@@ -51,13 +51,15 @@ class View:
         World.states() does."""
         if self._frames is not None:
             return
-        if self._core.bodies() != self._bodies:
-            self._read_scene(self._now())
-            if self._widget is not None:
-                with self._widget.hold_sync():
-                    self._widget.scene, self._widget.frame = self._scene, self._blobs()[0]
-        elif self._widget is not None:
-            self._widget.frame = self._blobs()[0]
+        is_other = self._core.bodies() != self._bodies
+        if not is_other and self._widget is None:
+            return
+        now = self._now()
+        if is_other:
+            self._read_scene(now)
+        if self._widget is not None:
+            with self._widget.hold_sync():
+                self._widget.scene, self._widget.frame = self._scene, self._blobs([now])[0]
 
     @contextlib.contextmanager
     def follow(self, *, speed: float | None = 1.0, rate: float = 30.0) -> Iterator[View]:
@@ -83,7 +85,7 @@ class View:
         InvalidArgument
             The view is not that of a world, or a number is out of its range.
         """
-        if self._followed is None:
+        if self._world is None:
             raise InvalidArgument("the view is not that of a world; World.view() makes one that can follow")
         if speed is not None and not _arrays.number(speed, "speed") > 0:
             raise InvalidArgument(f"speed is {speed}; it must be > 0, or None")
@@ -104,7 +106,7 @@ class View:
                 shown = now
                 self.update()
 
-        followers = self._followed._followers
+        followers = self._world._followers
         followers.append(show)
         try:
             yield self
@@ -166,29 +168,22 @@ class View:
 
     def _now(self) -> Frame:
         """The present state of the world."""
-        size = self._core.size()
-        states = States.empty(size, _dtype_of(self._core))
-        awake = np.empty(size, np.uint8)
-        self._core.write_states(*states)
+        states = self._world.states()
+        awake = np.empty(len(states.positions), np.uint8)
         self._core.write_awake(awake)
         return states.positions.astype(float), states.orientations.astype(float), awake
 
-    def _blobs(self) -> list[bytes]:
-        frames = [self._now()] if self._frames is None else self._frames
+    def _blobs(self, frames: Sequence[Frame] | None = None) -> list[bytes]:
+        """The given frames as bytes; those of the view, or the present state, if absent."""
+        frames = frames or self._frames or [self._now()]
         still = ~self._geometry.movable  # is never dimmed
         return [blob.frame_blob(p, q, np.where(still, 1, awake), self._origin) for p, q, awake in frames]
-
-
-def _dtype_of(core: Any) -> str:
-    return "float32" if type(core).__module__.endswith("f32") else "float64"
 
 
 def view_of_world(world: Any, height: int) -> View:
     """The view of World.view()."""
     scene = world.scene
-    view = View(world._core, None, interval=scene.dt, height=_height(height), title=scene.name)
-    view._followed = world
-    return view
+    return View(world._core, None, interval=scene.dt, height=_height(height), title=scene.name, world=world)
 
 
 def view_of_scene(scene: Any, states: Any, interval: Any, height: int) -> View:
