@@ -20,9 +20,6 @@ struct BoxTriangle : LocalTriangle {
   static constexpr int kEdgeAxis = kFaceAxis + 3;
 
   JFPX_HD EdgePoints edge_points(const LeastOverlap& edges) const;
-  JFPX_HD bool has_points(const LeastOverlap& axis) const {
-    return axis.axis < kEdgeAxis || edge_points(axis).are_on(axis);
-  }
   JFPX_HD Real lowest(const Vec3& axis) const { return -projected_half_length(half, axis); }
 };
 

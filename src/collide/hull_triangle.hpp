@@ -23,9 +23,6 @@ struct HullTriangle : LocalTriangle {
     const Vec3 a = hull.vertex(side.a);
     return closest_of_edges(a, hull.vertex(side.b) - a, corner[k], edge(k));
   }
-  JFPX_HD bool has_points(const LeastOverlap& axis) const {
-    return axis.axis < kEdgeAxis || edge_points(axis).are_on(axis);
-  }
   JFPX_HD Real lowest(const Vec3& axis) const { return -hull.support(-axis); }
 };
 

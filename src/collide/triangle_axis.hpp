@@ -2,8 +2,8 @@
 /// see mesh_triangle.hpp. A pair of a polyhedron and a triangle is a LocalTriangle with
 ///   - `kEdgeAxis`: number of the first axis that is the cross product of two edges;
 ///   - `lowest(axis)`: [m], least coordinate of the polyhedron along an axis;
-///   - `has_points(overlap)`: whether the axis of an overlap is that of two edges that cross, or no
-///     cross product of two edges;
+///   - `edge_points(overlap)`: the closest points of the two edges of an axis; a solid without
+///     edges has none;
 ///   - a function `for_each_axis(pair, visit)`.
 #pragma once
 
@@ -111,6 +111,16 @@ JFPX_HD bool is_nearer_to_neighbor(const Pair& pair, const TriangleInstance& tri
   return is_nearer;
 }
 
+/// Whether an axis is that of two edges that cross, or no cross product of two edges.
+template <class Pair>
+JFPX_HD bool has_points(const Pair& pair, const LeastOverlap& axis) {
+  if constexpr (requires { pair.edge_points(axis); }) {
+    return axis.axis < Pair::kEdgeAxis || pair.edge_points(axis).are_on(axis);
+  } else {
+    return true;
+  }
+}
+
 /// The axis of least overlap among the proximal normals of the mesh. The normal of the triangle is
 /// preferred to faces of the polyhedron, and these to edges; axes within a degree of the normal of
 /// the triangle do not replace it, so that a body that rests on a flat mesh has the same normal on
@@ -127,7 +137,7 @@ JFPX_HD LeastOverlap proximal_axis(const Pair& pair, const TriangleInstance& tri
     if (are_parallel(overlap.normal, pair.normal)) return true;
     const int feature = supporting_feature(pair.corner, overlap);
     if (feature == kFace) return true;
-    if (overlap.distance < 0 && !pair.has_points(overlap)) return true;
+    if (overlap.distance < 0 && !has_points(pair, overlap)) return true;
     if (triangle.is_proximal(feature, axes * overlap.normal)) *best = overlap;
     return true;
   });

@@ -139,7 +139,6 @@ struct FrustumTriangle : LocalTriangle {
   /// next one are the common normals of the axis of revolution and edge k.
   static constexpr int kEdgeAxis = kFaceAxis + 2;
 
-  JFPX_HD static bool has_points(const LeastOverlap&) { return true; }
   JFPX_HD Real lowest(const Vec3& axis) const { return dot(axis, support_point(pair.a, -axis)); }
   /// Whether the corners of the mesh are clockwise, seen from the side of the frustum.
   JFPX_HD bool is_flipped() const { return dot(cross(edge(0), corner[2] - corner[0]), normal) < 0; }
