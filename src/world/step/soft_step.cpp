@@ -126,9 +126,8 @@ void SoftStep::mark_constrained() {
 /// Calls stage(index) for all bodies that are not immovable.
 template <class Stage>
 void SoftStep::for_each_body(const BodyStore& store, const Stage& stage) {
-  const std::span<const std::uint32_t> bodies = store.mobile();
-  parallel_for(pool_, bodies.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const std::uint32_t i : bodies.subspan(first, last - first)) stage(i);
+  for_each_part(store, [&](std::span<const std::uint32_t> part) {
+    for (const std::uint32_t i : part) stage(i);
   });
 }
 
