@@ -107,6 +107,15 @@ int scene_steps(int otherwise) {
   return given != nullptr ? std::atoi(given) : otherwise;
 }
 
+/// Makes a step of two worlds, which must have the same report and the same state.
+/// @param contacts null, or a sum to which the number of contacts is added
+void step_both(World* host, World* device, std::uint64_t* contacts = nullptr) {
+  const StepReport a = host->step(), b = device->step();
+  ASSERT_NO_FATAL_FAILURE(expect_equal(a, b));
+  ASSERT_EQ(host->state_hash(), device->state_hash());
+  if (contacts != nullptr) *contacts += a.contacts;
+}
+
 TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
@@ -115,9 +124,7 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
     const Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
     for (int n = 0; n < scene_steps(40); ++n) {
-      const StepReport a = host.step(), b = device.step();
-      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "scene " << k << ", step " << n;
-      ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
+      ASSERT_NO_FATAL_FAILURE(step_both(&host, &device)) << "scene " << k << ", step " << n;
       if (n % 3 != 0) continue;
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
     }
@@ -152,10 +159,7 @@ TEST_P(DeviceWorldTest, BodiesOnHeightfieldsHaveTheBitsOfTheProcessor) {
     }
     World host = on_host(scene), device = on_device(scene);
     for (int n = 0; n < scene_steps(40); ++n) {
-      const StepReport a = host.step(), b = device.step();
-      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
-      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
-      contacts += a.contacts;
+      ASSERT_NO_FATAL_FAILURE(step_both(&host, &device, &contacts)) << "step " << n;
     }
     ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
     EXPECT_TRUE(WorldAccess::impl(device).resident());
@@ -194,10 +198,7 @@ TEST_P(DeviceWorldTest, ManyFixedBodiesHaveTheBitsOfTheProcessor) {
   World host = on_host(scene), device = on_device(scene);
   std::uint64_t contacts = 0;
   for (int n = 0; n < scene_steps(90); ++n) {
-    const StepReport a = host.step(), b = device.step();
-    ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
-    ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
-    contacts += a.contacts;
+    ASSERT_NO_FATAL_FAILURE(step_both(&host, &device, &contacts)) << "step " << n;
     if (n % 4 != 3) continue;
     const BodyDef def = fixed();
     const BodyId id = host.bodies()[random.below(host.bodies().size())];
@@ -232,9 +233,7 @@ TEST_P(DeviceWorldTest, BodiesOnFlushTilesHaveTheBitsOfTheProcessor) {
     }
     World host = on_host(scene), device = on_device(scene);
     for (int n = 0; n < scene_steps(60); ++n) {
-      const StepReport a = host.step(), b = device.step();
-      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "step " << n;
-      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+      ASSERT_NO_FATAL_FAILURE(step_both(&host, &device)) << "step " << n;
     }
     ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
     EXPECT_TRUE(WorldAccess::impl(device).resident());
@@ -500,9 +499,7 @@ TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
         ASSERT_TRUE(host.snapshot() == device.snapshot()) << "step " << n;
       }
       if (!WorldAccess::impl(device).resident()) ++uploads;
-      const StepReport a = host.step(), b = device.step();
-      ASSERT_NO_FATAL_FAILURE(expect_equal(a, b)) << "scene " << k << ", step " << n;
-      ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
+      ASSERT_NO_FATAL_FAILURE(step_both(&host, &device)) << "scene " << k << ", step " << n;
       if (!shows_events) continue;
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "step " << n;
     }
