@@ -63,23 +63,19 @@ class BlockMotion {
     if constexpr (kHasRotation) quads_[3 * kBodies + i] = {body.rotation, 0};
   }
 
-  /// Versions of the cells of a body, and which of them are outdated.
-  struct State {
-    BodyCells::Version version;
-    bool shift_changed = false, rotation_changed = false;
+  /// What has changed since the motion of a body was read.
+  struct Changes {
+    bool shift = false, rotation = false;
   };
-  JFPX_HD State state(std::uint32_t i) const {
-    const std::uint32_t word = words_[i];
-    return {BodyCells::Version(word), (word & kShiftChanged) != 0, (word & kRotationChanged) != 0};
+  JFPX_HD Changes changes(std::uint32_t i) const {
+    return {(words_[i] & kShift) != 0, (words_[i] & kRotation) != 0};
   }
-  JFPX_HD void set_state(std::uint32_t i, const State& s) const {
-    words_[i] = s.version.word((s.shift_changed ? kShiftChanged : 0) |
-                               (s.rotation_changed ? kRotationChanged : 0));
+  JFPX_HD void set_changes(std::uint32_t i, const Changes& changes) const {
+    words_[i] = (changes.shift ? kShift : 0) | (changes.rotation ? kRotation : 0);
   }
 
  private:
-  // In the bits of the ticket.
-  static constexpr std::uint32_t kShiftChanged = 1, kRotationChanged = 2;
+  static constexpr std::uint32_t kShift = 1, kRotation = 2;
 
   Quad* quads_;
   std::uint32_t* words_;

@@ -27,14 +27,6 @@ struct BlockPhase {
   bool has_bodies = true;   ///< whether the sweep before is completed
   bool has_rows = true;     ///< whether inner rows are solved
 
-  /// The ticket of the bodies before and after the work.
-  JFPX_HD std::uint32_t ticket_before(std::uint64_t colors) const {
-    if (!has_bodies || sweep == 0) return Tickets::before_sweep(sweep);
-    return Tickets(sweep - 1, colors).last();
-  }
-  JFPX_HD std::uint32_t ticket_after() const {
-    return has_rows ? Tickets(sweep, 0).first : Tickets::before_sweep(sweep);
-  }
   JFPX_HD BodyStage stage() const {
     return has_bodies ? sweeps.stage_before(sweep) : BodyStage::none;
   }
@@ -49,22 +41,18 @@ struct BlockPhase {
 ///
 /// A block of threads solves the inner rows of a block of bodies in shared memory. Before them, it
 /// completes the sweep before, with the rows of these bodies with fixed bodies, and the substep.
-/// Crossing rows follow without barriers between their colors: a row waits only for the earlier
-/// crossing rows of its two bodies (see Tickets). Blocks and rows exchange only the motion of
-/// bodies, and all other arrays by body are constant or written only by the threads of its block.
-///
-/// There is no deadlock: the items of a thread have the order of the colors, and each waits only
-/// for earlier ones in this order, so the first incomplete item is always ready.
+/// All threads solve the crossing rows, with a barrier after each color. Between two barriers, the
+/// motion of a body is accessed only by one row, or by the threads of its block.
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program with
 ///   fewer kinds needs fewer registers and less shared memory
 template <soft_step::RowKind kKinds>
-struct BlockSolveProgram : RowSolver<kKinds> {
+struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
   using Motion = BlockMotion<kKinds>;
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
   static constexpr std::size_t kSharedBytes = Motion::kBytes;
-  using RowSolver<kKinds>::data;
+  using RowSolver<kKinds, BodyMotion>::data;
 
-  /// The sequence is that of SoftStep::solve(). BodyCells depends on the number of sweeps.
+  /// The sequence is that of SoftStep::solve().
   template <class Team>
   [[gnu::always_inline]] JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed() || !is_selected()) return;
@@ -80,23 +68,17 @@ struct BlockSolveProgram : RowSolver<kKinds> {
         run_blocks(team, sweep, phase);
         team.sync();
         team.once([&] {
-          visit_operation(sweeps.kind(s), [&](const auto& operation) {
-            this->run_overflow(sweep, operation, Tickets::before_sweep(s));
-          });
+          visit_operation(sweeps.kind(s),
+                          [&](const auto& operation) { this->run_overflow(sweep, operation, 0); });
         });
         team.sync();
         phase.has_rows = true;
         phase.has_bodies = false;
       }
       run_blocks(team, sweep, phase);
-      // Thousands of threads that wait for their rows would delay the blocks.
+      if (s == sweeps.size()) break;
       team.sync();
-      visit_operation(sweeps.kind(s), [&](const auto& operation) {
-        using Operation = std::remove_cvref_t<decltype(operation)>;
-        team.run_dataflow(sweep.colored_items,
-                          typename Base::template RowDataflow<Operation>(*this, sweep, operation));
-      });
-      team.sync();
+      solve_crossing(team, sweep);
     }
     team.for_each_nowait(d.step.bodies.count, [&](std::uint32_t i) {
       this->finish_kinematic(d.step.bodies.ids[i].index);
@@ -104,7 +86,7 @@ struct BlockSolveProgram : RowSolver<kKinds> {
   }
 
  private:
-  using Base = RowSolver<kKinds>;
+  using Base = RowSolver<kKinds, BodyMotion>;
   using typename Base::BodyFree, typename Base::Impact, typename Base::ItemBody,
       typename Base::SolverBody;
 
@@ -143,6 +125,28 @@ struct BlockSolveProgram : RowSolver<kKinds> {
     }
   }
 
+  /// Solves the crossing rows of a sweep. Begins after a barrier, and ends with one.
+  template <class Team>
+  [[gnu::always_inline]] JFPX_HD void solve_crossing(const Team& team, const Sweep& sweep) const {
+    visit_operation(sweep.kind(), [&](const auto& operation) {
+      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+        bool has_rows = false;
+        for (soft_step::RowKind kind = 0; kind < kKinds; ++kind) {
+          const std::uint32_t bin = soft_step::bin_of(kind, soft_step::group_of_crossing(color));
+          const std::uint32_t first = sweep.begin[bin], rows = sweep.size(bin);
+          has_rows = has_rows || rows > 0;
+          team.for_each_nowait(rows, [&](std::uint32_t i) {
+            typename Base::RowItem item;
+            this->begin_row(sweep, first + i, &item);
+            this->is_ready(&item);
+            this->solve_row(sweep, operation, &item);
+          });
+        }
+        if (has_rows) team.sync();
+      }
+    });
+  }
+
   template <class Team>
   [[gnu::always_inline]] JFPX_HD void run_blocks(const Team& team, const Sweep& sweep,
                                                  const BlockPhase& phase) const {
@@ -179,7 +183,7 @@ struct BlockSolveProgram : RowSolver<kKinds> {
         solve_inner(threads, phase, operation, motion, places.begin);
       });
     }
-    threads.for_each(count, [&](std::uint32_t i) { publish(phase, motion, i, places.begin + i); });
+    threads.for_each(count, [&](std::uint32_t i) { publish(motion, i, places.begin + i); });
   }
 
   /// Solves the inner rows of a block.
@@ -304,22 +308,22 @@ struct BlockSolveProgram : RowSolver<kKinds> {
       if constexpr (Operation::kMovesBodies) {
         const bool moves = !(body.shift == shift);
         if (!moves && !Row::kReadsRotation && !impact.is_pending) return;
-        typename Motion::State state = motion.state(i);
+        typename Motion::Changes changes = motion.changes(i);
         if (moves) {
           motion.store_shift(i, body);
-          state.shift_changed = true;
+          changes.shift = true;
         }
         if constexpr (Row::kReadsRotation) {
           motion.store_rotation(i, body);
-          state.rotation_changed = true;
+          changes.rotation = true;
         }
         if (impact.is_pending) {
-          const BodyCells cells = d.cells(first_place + i);
-          soft_step::FreeMotion free = cells.read_free(state.version);
+          const BodyMotion stored(d.columns, first_place + i);
+          soft_step::FreeMotion free = stored.read_free({});
           free.add(change.velocity, change.angular_velocity);
-          cells.write_free(free, &state.version);
+          stored.write_free(free);
         }
-        motion.set_state(i, state);
+        motion.set_changes(i, changes);
       }
     };
     write(row.a, a, shift_a, impact.of_a);
@@ -336,16 +340,14 @@ struct BlockSolveProgram : RowSolver<kKinds> {
   /// Makes the motion of a body visible to crossing rows and to the next phase.
   /// @param i     place of the body in its block
   /// @param index its solver index
-  JFPX_HD void publish(const BlockPhase& phase, const Motion& motion, std::uint32_t i,
-                       std::uint32_t index) const {
-    const SolverBody state = motion.load(i);
-    if (!(state.inverse_mass > 0)) return;
-    const BodyCells cells = data.cells(index);
-    typename Motion::State versions = motion.state(i);
-    if (versions.shift_changed) cells.write_shift(state, &versions.version);
-    if (versions.rotation_changed) cells.write_rotation(state, &versions.version);
-    cells.write(phase.ticket_after(), state, versions.version);
-    motion.set_state(i, {versions.version});
+  JFPX_HD void publish(const Motion& motion, std::uint32_t i, std::uint32_t index) const {
+    const SolverBody body = motion.load(i);
+    if (!(body.inverse_mass > 0)) return;
+    const BodyMotion stored(data.columns, index);
+    const typename Motion::Changes changes = motion.changes(i);
+    if (changes.shift) stored.write_shift(body);
+    if (changes.rotation) stored.write_rotation(body);
+    stored.write(0, body);
   }
 
   /// Completes the sweep before, and puts the motion of the body into shared memory.
@@ -354,27 +356,25 @@ struct BlockSolveProgram : RowSolver<kKinds> {
   JFPX_HD void complete_body(const Sweep& before, const BlockPhase& phase, const Motion& motion,
                              std::uint32_t place, std::uint32_t i) const {
     const StepData& d = data;
-    const RowBody constants = d.row_bodies[i];
-    if (!(constants.inverse_mass > 0)) {
+    ItemBody item;
+    item.index = i;
+    item.template read<Motion::kHasRotation>(d);
+    if (!(item.motion.inverse_mass > 0)) {
       motion.store_velocities(place, {});
       return;
     }
-    ItemBody item;
-    item.start(i, constants);
-    typename Motion::State state;
-    item.before = phase.ticket_before(constants.colors);
-    item.template read<Motion::kHasRotation>(d);
+    typename Motion::Changes changes;
     const std::uint32_t first_fixed = d.first_fixed[i];
     SolverBody& body = item.motion;
-    const BodyCells cells = d.cells(i);
+    const BodyMotion stored(d.columns, i);
     BodyFree free;
     visit_operation(phase.fixed_sweep(), [&](const auto& operation) {
       const Vec3 shift = body.shift;
       for (std::uint32_t r = first_fixed; r != kNone; r = d.next_fixed[r]) {
         this->solve_fixed(before, operation, r, &item, &free);
-        if constexpr (Motion::kHasRotation) state.rotation_changed = true;
+        if constexpr (Motion::kHasRotation) changes.rotation = true;
       }
-      if (!(body.shift == shift)) state.shift_changed = true;
+      if (!(body.shift == shift)) changes.shift = true;
     });
     switch (phase.stage()) {
       case BodyStage::none:
@@ -388,25 +388,24 @@ struct BlockSolveProgram : RowSolver<kKinds> {
       }
       case BodyStage::move:
         this->move(d.body_at[i], i, phase.sweeps.moves(phase.sweep), &body);
-        state.shift_changed = state.rotation_changed = true;
+        changes.shift = changes.rotation = true;
         break;
       case BodyStage::accelerate: {
         const Vec3 shift = body.shift;
-        free.read(cells, item.version);
+        free.read(stored, item.version);
         d.step.accelerate(d.body_at[i], d.substep_bodies.load(i), d.orientation[i], &body,
                           &free.motion, false);
         free.is_changed = true;
-        if (!(body.shift == shift)) state.shift_changed = true;
+        if (!(body.shift == shift)) changes.shift = true;
         break;
       }
     }
-    if (free.is_changed) cells.write_free(free.motion, &item.version);
-    state.version = item.version;
-    if constexpr (!Motion::kHasRotation) state.rotation_changed = false;
+    if (free.is_changed) stored.write_free(free.motion);
+    if constexpr (!Motion::kHasRotation) changes.rotation = false;
     motion.store_velocities(place, body);
     motion.store_shift(place, body);
     motion.store_rotation(place, body);
-    motion.set_state(place, state);
+    motion.set_changes(place, changes);
   }
 };
 

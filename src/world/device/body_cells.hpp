@@ -15,11 +15,11 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Tickets: sequence numbers of the updates of a body. Each sweep has kPerSweep tickets: one before
-/// the overflow, one before the colors, and one for the row of each color. A row waits for the
-/// ticket of the previous row of the body, then publishes its own ticket. Colors without a row of
-/// the body have no tickets. Overflow rows do not change the ticket, because barriers enclose them.
-/// In a world with blocks, the colors are those of crossing rows, which inner rows precede.
+/// Tickets: sequence numbers of the updates of a body in a world of one block. Each sweep has
+/// kPerSweep tickets: one before the overflow, one before the colors, and one for the row of each
+/// color. A row waits for the ticket of the previous row of the body, then publishes its own
+/// ticket. Colors without a row of the body have no tickets. Overflow rows do not change the
+/// ticket, because barriers enclose them.
 struct Tickets {
   static constexpr std::uint32_t kPerSweep = soft_step::kColorsPerClass + 2u;
 
@@ -28,9 +28,6 @@ struct Tickets {
 
   JFPX_HD Tickets(std::uint32_t sweep, std::uint64_t row_colors)
       : colors(row_colors), first(sweep * kPerSweep + 1) {}
-
-  /// The ticket before the overflow rows of a sweep.
-  JFPX_HD static std::uint32_t before_sweep(std::uint32_t sweep) { return sweep * kPerSweep; }
 
   /// The ticket after the row of a color.
   JFPX_HD std::uint32_t after(std::uint32_t color) const { return first + 1 + color; }
@@ -153,6 +150,7 @@ class OrientationCells {
 /// versions of the matching other cells.
 class BodyCells {
  public:
+  static constexpr bool kHasMasses = false;  ///< RowBody has them
   static constexpr std::uint32_t kTicketBits = 14, kVersionBits = 6;
   static constexpr std::uint32_t kVersionMask = (1u << kVersionBits) - 1;
 
@@ -251,6 +249,82 @@ class BodyCells {
 
   CellColumns columns_;
   std::uint32_t i_;
+};
+
+/// Access to the motion of a body in a world with blocks, whose accesses barriers divide: the
+/// interface and the memory of BodyCells, without tickets and versions. The velocities and the
+/// masses of a body are one sector of the cache, because crossing rows access bodies in any order.
+class BodyMotion {
+ public:
+  static constexpr bool kHasMasses = true;
+  struct Version {};
+
+  /// @param i index of the body in the columns
+  JFPX_HD BodyMotion(const CellColumns& columns, std::uint32_t i)
+      : velocities_(reinterpret_cast<Velocities*>(columns.cells) + i),
+        shift_(vector(columns, CellColumns::kShift, i)),
+        rotation_(vector(columns, CellColumns::kRotation, i)),
+        free_velocity_(vector(columns, CellColumns::kFreeVelocity, i)),
+        free_spin_(vector(columns, CellColumns::kFreeSpin, i)) {}
+
+  /// The motion before the first row.
+  JFPX_HD void start(const soft_step::SolverBody& body, const soft_step::FreeMotion& free) const {
+    write(0, body);
+    write_shift(body);
+    write_rotation(body);
+    write_free(free);
+  }
+  /// Reads the motion. @tparam kRotation whether to read the rotation @returns true
+  template <bool kRotation>
+  JFPX_HD bool read(std::uint32_t, soft_step::SolverBody* body, Version*) const {
+    const Velocities v = *velocities_;
+    const Vector s = *shift_;
+    body->velocity = v.velocity;
+    body->inverse_mass = v.inverse_mass;
+    body->angular_velocity = v.angular_velocity;
+    body->inverse_inertia = v.inverse_inertia;
+    body->shift = s.vector;
+    if constexpr (kRotation) body->rotation = Vector(*rotation_).vector;
+    return true;
+  }
+  JFPX_HD void write(std::uint32_t, const soft_step::SolverBody& body, const Version& = {}) const {
+    *velocities_ = {body.velocity, body.inverse_mass, body.angular_velocity, body.inverse_inertia};
+  }
+  JFPX_HD void write_shift(const soft_step::SolverBody& body, Version* = nullptr) const {
+    *shift_ = {body.shift, 0};
+  }
+  JFPX_HD void write_rotation(const soft_step::SolverBody& body, Version* = nullptr) const {
+    *rotation_ = {body.rotation, 0};
+  }
+  JFPX_HD void write_free(const soft_step::FreeMotion& free, Version* = nullptr) const {
+    *free_velocity_ = {free.velocity, 0};
+    *free_spin_ = {free.angular_velocity, 0};
+  }
+  JFPX_HD soft_step::FreeMotion read_free(const Version&) const {
+    return {Vector(*free_velocity_).vector, Vector(*free_spin_).vector};
+  }
+
+ private:
+  struct alignas(8 * sizeof(Real)) Velocities {
+    Vec3 velocity;
+    Real inverse_mass;
+    Vec3 angular_velocity;
+    Real inverse_inertia;
+  };
+  struct alignas(4 * sizeof(Real)) Vector {
+    Vec3 vector;
+    Real unused;
+  };
+  static_assert(sizeof(Velocities) == 2 * sizeof(VectorCells));
+  static_assert(sizeof(Vector) == sizeof(VectorCells));
+  static_assert(CellColumns::kVelocity == 0 && CellColumns::kAngularVelocity == 1);
+  JFPX_HD static Vector* vector(const CellColumns& columns, CellColumns::Column column,
+                                std::uint32_t i) {
+    return reinterpret_cast<Vector*>(columns.at(column, i));
+  }
+
+  Velocities* velocities_;
+  Vector *shift_, *rotation_, *free_velocity_, *free_spin_;
 };
 
 /// Constants of a body during a step, for its rows.

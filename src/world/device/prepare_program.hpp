@@ -74,6 +74,7 @@ struct PrepareProgram {
     if (i == kNone || !bodies.is_active(i)) {
       d.row_bodies[index] = {};
       d.balls[index] = {};
+      if (bodies.has_blocks) BodyMotion(d.columns, index).start({}, {});
       return;
     }
     soft_step::SolverBody body = d.step.solver[i];
@@ -85,7 +86,11 @@ struct PrepareProgram {
     d.orientation[index] = orientation;
     soft_step::FreeMotion free;
     d.step.accelerate(i, constants, orientation, &body, &free, true);
-    d.cells(index).start(body, free);
+    if (bodies.has_blocks) {
+      BodyMotion(d.columns, index).start(body, free);
+    } else {
+      BodyCells(d.columns, index).start(body, free);
+    }
     if (constants.has(soft_step::SubstepBody::kHasJoints)) {
       d.orientation_cells[i].store(orientation, 0);
     }

@@ -14,15 +14,16 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Solves the rows of the overflow, of colors and with fixed bodies. Rows of colors exchange the
-/// motion of their bodies through BodyCells: a row waits only for the earlier rows of its two
-/// bodies (see Tickets).
+/// Solves the rows of the overflow, of colors and with fixed bodies. In a world of one block, rows
+/// of colors exchange the motion of their bodies through BodyCells: a row waits only for the
+/// earlier rows of its two bodies (see Tickets).
 ///
 /// `a` and `b` of a row are places in a block (inner rows) or solver indices; `b` of a row with a
 /// fixed body is that body, or kWorld.
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program with
 ///   fewer kinds needs fewer registers
-template <soft_step::RowKind kKinds>
+/// @tparam Cells access to the motion of a body: BodyCells, or BodyMotion in a world with blocks
+template <soft_step::RowKind kKinds, class Cells>
 struct RowSolver {
   using SolverBody = soft_step::SolverBody;
 
@@ -54,7 +55,7 @@ struct RowSolver {
     bool is_read = false, is_changed = false;
     soft_step::FreeMotion motion;
 
-    JFPX_HD void read(const BodyCells& cells, const BodyCells::Version& version) {
+    JFPX_HD void read(const Cells& cells, const typename Cells::Version& version) {
       if (!is_read) motion = cells.read_free(version);
       is_read = true;
     }
@@ -67,16 +68,19 @@ struct RowSolver {
     std::uint32_t before = 0, after = 0;  ///< tickets
     bool is_ready = false;
     SolverBody motion;
-    BodyCells::Version version;
+    typename Cells::Version version;
 
     template <bool kRotation>
     JFPX_HD void read(const StepData& step) {
-      is_ready = step.cells(index).template read<kRotation>(before, &motion, &version);
+      is_ready = Cells(step.columns, index).template read<kRotation>(before, &motion, &version);
     }
-    JFPX_HD void start(std::uint32_t i, const RowBody& constants) {
+    JFPX_HD void start(std::uint32_t i, const StepData& step) {
       index = i;
-      motion.inverse_mass = constants.inverse_mass;
-      motion.inverse_inertia = constants.inverse_inertia;
+      if constexpr (!Cells::kHasMasses) {
+        const RowBody& constants = step.row_bodies[i];
+        motion.inverse_mass = constants.inverse_mass;
+        motion.inverse_inertia = constants.inverse_inertia;
+      }
     }
   };
 
@@ -149,8 +153,8 @@ struct RowSolver {
         a = row.a, b = row.b;
       }
     });
-    item->a.start(a, d.row_bodies[a]);
-    item->b.start(b, d.row_bodies[b]);
+    item->a.start(a, d);
+    item->b.start(b, d);
   }
 
   JFPX_HD void begin_colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color,
@@ -201,7 +205,7 @@ struct RowSolver {
     operation.template run<false>(
         &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
     const auto write = [&](ItemBody* body, const Vec3& shift, const soft_step::FreeMotion& change) {
-      const BodyCells cells = data.cells(body->index);
+      const Cells cells(data.columns, body->index);
       if constexpr (Operation::kMovesBodies) {
         if (!(body->motion.shift == shift)) cells.write_shift(body->motion, &body->version);
         if (impact.is_pending) {
@@ -234,7 +238,7 @@ struct RowSolver {
     }
     operation.template run<false>(&row, context);
     const auto write = [&](ItemBody* body) {
-      const BodyCells cells = data.cells(body->index);
+      const Cells cells(data.columns, body->index);
       if constexpr (Operation::kMovesBodies) {
         cells.write_shift(body->motion, &body->version);
         if constexpr (Row::kReadsRotation) cells.write_rotation(body->motion, &body->version);
@@ -336,7 +340,7 @@ struct RowSolver {
     operation.template run<true>(
         &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
     if (impact.is_pending) {
-      free->read(data.cells(item->index), item->version);
+      free->read(Cells(data.columns, item->index), item->version);
       free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
       free->is_changed = true;
     }

@@ -21,12 +21,12 @@ namespace device {
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program without
 ///   rows of joints needs fewer registers
 template <soft_step::RowKind kKinds>
-struct SolveProgram : RowSolver<kKinds> {
+struct SolveProgram : RowSolver<kKinds, BodyCells> {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
   /// Minimum number of items per thread for a second block per multiprocessor. Waiting threads poll
   /// memory, so a second block pays only if rows rarely wait.
   static constexpr std::size_t kItemsPerThread = 32;
-  using RowSolver<kKinds>::data;
+  using RowSolver<kKinds, BodyCells>::data;
 
   /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has sweeps
   /// over joints, a bias sweep, after which the bodies move, and kRelaxSweeps relax sweeps. The
@@ -65,7 +65,7 @@ struct SolveProgram : RowSolver<kKinds> {
   }
 
  private:
-  using Base = RowSolver<kKinds>;
+  using Base = RowSolver<kKinds, BodyCells>;
   using typename Base::BodyFree, typename Base::ItemBody, typename Base::SolverBody;
 
   struct BodyItem : ItemBody {
@@ -115,7 +115,7 @@ struct SolveProgram : RowSolver<kKinds> {
   JFPX_HD void begin_body(const Sweep& sweep, std::uint32_t body, BodyItem* item) const {
     const StepData& d = data;
     const RowBody constants = d.row_bodies[body];
-    item->start(body, constants);
+    item->start(body, d);
     item->is_active = constants.inverse_mass > 0;
     item->first_fixed = d.first_fixed[body];
     const Tickets tickets(sweep.number, constants.colors);
@@ -132,7 +132,7 @@ struct SolveProgram : RowSolver<kKinds> {
       return;
     }
     SolverBody& body = item->motion;
-    const BodyCells cells = d.cells(i);
+    const BodyCells cells(d.columns, i);
     BodyFree free;
     for (std::uint32_t r = item->first_fixed; r != kNone;) {
       const std::uint32_t next = d.next_fixed[r];

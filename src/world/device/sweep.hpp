@@ -87,6 +87,7 @@ struct Sweep {
       }
     }
   }
+  JFPX_HD SweepKind kind() const { return sweeps.kind(number); }
   JFPX_HD soft_step::RowKind kind_of(std::uint32_t row) const {
     return soft_step::kind_of_row(begin, row);
   }
