@@ -12,15 +12,15 @@ namespace {
 using jfpx::Real;
 
 // Layers are bits; kPlayer collides with all but kDebris.
-constexpr std::uint32_t kLevel = 1, kPlayer = 2, kDebris = 4, kTrigger = 8, kAll = ~0u;
+constexpr std::uint32_t kLevel = 1, kPlayer = 2, kDebris = 4, kTrigger = 8;
 
 jfpx::BodyDef body(const jfpx::Shape& shape, const jfpx::Vec3& position, Real mass,
-                   std::uint32_t layer, std::uint32_t mask = kAll) {
+                   const jfpx::CollisionFilter& filter) {
   jfpx::BodyDef def;
   def.shape = shape;
   def.position = position;
   def.mass = mass;  // 0: static, or kinematic if def.kinematic is set
-  def.filter = {.category = layer, .mask = mask};
+  def.filter = filter;
   return def;
 }
 
@@ -40,16 +40,16 @@ jfpx::Vec3 interpolate(const jfpx::Vec3& before, const jfpx::Vec3& after, Real f
 
 int main() {
   jfpx::Scene scene;  // steps of 1/60 s, gravity (0, -9.81, 0) in each BodyDef
-  scene.bodies.push_back(body(jfpx::Box{{20, 1, 20}}, {0, -1, 0}, 0, kLevel));
+  scene.bodies.push_back(body(jfpx::Box{{20, 1, 20}}, {0, -1, 0}, 0, {kLevel}));
   jfpx::World world(scene);
 
-  jfpx::BodyDef platform = body(jfpx::Box{{2, Real(0.1), 2}}, {8, Real(0.1), 0}, 0, kLevel);
+  jfpx::BodyDef platform = body(jfpx::Box{{2, Real(0.1), 2}}, {8, Real(0.1), 0}, 0, {kLevel});
   platform.kinematic = true;
   platform.velocity = {0, 1, 0};  // until set_state() changes it
   const jfpx::BodyId lift = world.add(platform);
 
   jfpx::HingeJoint hinge;
-  hinge.a = world.add(body(jfpx::Box{{Real(0.5), 1, Real(0.05)}}, {-3, 1, 0}, 20, kLevel));
+  hinge.a = world.add(body(jfpx::Box{{Real(0.5), 1, Real(0.05)}}, {-3, 1, 0}, 20, {kLevel}));
   hinge.min_angle = 0;
   hinge.max_angle = Real(1.5);
   hinge.motor_speed = 1;
@@ -60,25 +60,28 @@ int main() {
 
   constexpr Real kLocked = Real(1e9);  // [kg m^2]
   // A character is a capsule whose rotation is locked by a large inertia.
-  jfpx::BodyDef walker =
-      body(jfpx::Capsule{Real(0.4), Real(0.5)}, {0, Real(0.9), 6}, 80, kPlayer, kAll & ~kDebris);
+  jfpx::BodyDef walker = body(jfpx::Capsule{Real(0.4), Real(0.5)}, {0, Real(0.9), 6}, 80,
+                              {.category = kPlayer, .mask = ~kDebris});
   walker.inertia = jfpx::diagonal({kLocked, kLocked, kLocked});
   walker.friction = 0;
   walker.can_sleep = false;
   const jfpx::BodyId player = world.add(walker);
 
-  jfpx::BodyDef coin = body(jfpx::Sphere{Real(0.5)}, {0, 1, 0}, 0, kTrigger, kPlayer);
+  jfpx::BodyDef coin =
+      body(jfpx::Sphere{Real(0.5)}, {0, 1, 0}, 0, {.category = kTrigger, .mask = kPlayer});
   coin.sensor = true;
   coin.user_data = 42;  // an index of the game's own objects
   world.add(coin);
 
-  const jfpx::BodyId crate = world.add(body(jfpx::Box{{1, 1, 1}}, {0, 1, -6}, 30, kDebris));
+  const jfpx::BodyId crate = world.add(body(jfpx::Box{{1, 1, 1}}, {0, 1, -6}, 30, {kDebris}));
 
   constexpr Real kDt = Real(1) / 60;
   Real accumulator = 0;
   jfpx::Vec3 before, after;
   for (int frame = 0; frame < 288; ++frame) {  // 144 frames per second
-    for (accumulator += Real(1) / 144; accumulator >= kDt; accumulator -= kDt) {
+    accumulator += Real(1) / 144;
+    while (accumulator >= kDt) {
+      accumulator -= kDt;
       jfpx::BodyState walk = world.state(player);
       before = walk.position;
       walk.velocity = {0, walk.velocity.y, -3};
