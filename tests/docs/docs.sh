@@ -47,7 +47,7 @@ check_snippet() { # DOCUMENT TEXT
   snippets=$((snippets + 1))
   [[ "$examples" == *"$2"* ]] || complain "$1: not in the examples: $2"
 }
-for document in README.md docs/*.md; do
+for document in README.md docs/*.md docs/reference/*.md; do
   kind=
   snippet=
   while IFS= read -r line; do

@@ -43,6 +43,13 @@ def test_a_run_is_saved_as_a_page(tmp_path):
     assert page.read_text().startswith("<!DOCTYPE html>")
 
 
+def test_a_drum_keeps_its_bodies(tmp_path):
+    file = tmp_path / "drum.json"
+    text = run("drum.py", "--bodies", "60", "--steps", "90", "--save", file)
+    assert "after 90 steps; bodies that left the drum: 0" in text
+    assert len(jfpx.World(jfpx.Scene.load(file))) == 63
+
+
 def test_forces_by_torch_are_the_differences_of_the_energy():
     pytest.importorskip("torch")
     assert "forces are the differences of the energy\npressure without motion: " in run("lennard_jones.py")

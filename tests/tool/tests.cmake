@@ -15,8 +15,8 @@ foreach(suffix IN ITEMS "" "_f64")
 endforeach()
 
 if(JFPX_HAS_BULLET)
-  add_test(NAME ReadmeSample COMMAND
-    ${PROJECT_SOURCE_DIR}/tests/docs/readme_sample.sh $<TARGET_FILE:jfpx_tool>)
+  add_test(NAME CompareSample COMMAND
+    ${PROJECT_SOURCE_DIR}/tests/docs/compare_sample.sh $<TARGET_FILE:jfpx_tool>)
   # A reduced matrix of scripts/identity.
   add_test(NAME identity COMMAND ${PROJECT_SOURCE_DIR}/scripts/identity
     --jfpx $<TARGET_FILE:jfpx_tool> --spheres 6 --steps 10 --threads "1 3")

@@ -1,0 +1,126 @@
+/// Example of a small game scene: layers, a lift, a door, a character, a trigger and shots, with a
+/// fixed step that is interpolated for drawing. docs/porting.md has the terms of other engines.
+#include <jfpx/world.hpp>
+
+#include <cstdint>
+#include <cstdio>
+#include <optional>
+#include <vector>
+
+namespace {
+
+using jfpx::Real;
+
+// Layers are bits; kPlayer collides with all but kDebris.
+constexpr std::uint32_t kLevel = 1, kPlayer = 2, kDebris = 4, kTrigger = 8;
+
+jfpx::BodyDef body(const jfpx::Shape& shape, const jfpx::Vec3& position, Real mass,
+                   const jfpx::CollisionFilter& filter) {
+  jfpx::BodyDef def;
+  def.shape = shape;
+  def.position = position;
+  def.mass = mass;  // 0: static, or kinematic if def.kinematic is set
+  def.filter = filter;
+  return def;
+}
+
+/// Box2D's ApplyLinearImpulseToCenter() [N s], Jolt's AddImpulse().
+void apply_impulse(jfpx::World* world, jfpx::BodyId id, const jfpx::Vec3& impulse) {
+  jfpx::BodyState state = world->state(id);
+  state.velocity += impulse * (1 / world->mass(id));
+  world->set_state(id, state);
+}
+
+/// Pose for drawing, between two steps.
+jfpx::Vec3 interpolate(const jfpx::Vec3& before, const jfpx::Vec3& after, Real fraction) {
+  return before + (after - before) * fraction;
+}
+
+}  // namespace
+
+int main() {
+  jfpx::Scene scene;  // steps of 1/60 s, gravity (0, -9.81, 0) in each BodyDef
+  scene.bodies.push_back(body(jfpx::Box{{20, 1, 20}}, {0, -1, 0}, 0, {kLevel}));
+  jfpx::World world(scene);
+
+  jfpx::BodyDef platform = body(jfpx::Box{{2, Real(0.1), 2}}, {8, Real(0.1), 0}, 0, {kLevel});
+  platform.kinematic = true;
+  platform.velocity = {0, 1, 0};  // until set_state() changes it
+  const jfpx::BodyId lift = world.add(platform);
+
+  jfpx::HingeJoint hinge;
+  hinge.a = world.add(body(jfpx::Box{{Real(0.5), 1, Real(0.05)}}, {-3, 1, 0}, 20, {kLevel}));
+  hinge.min_angle = 0;
+  hinge.max_angle = Real(1.5);
+  hinge.motor_speed = 1;
+  hinge.max_motor_torque = 200;
+  // A joint without `b` holds the body in the world.
+  place_joint(&hinge, world.state(hinge.a), {}, {Real(-3.5), 1, 0}, jfpx::Vec3{0, 1, 0});
+  const jfpx::JointId door = world.add_joint(hinge);
+
+  constexpr Real kLocked = Real(1e9);  // [kg m^2]
+  // A character is a capsule whose rotation is locked by a large inertia.
+  jfpx::BodyDef walker = body(jfpx::Capsule{Real(0.4), Real(0.5)}, {0, Real(0.9), 6}, 80,
+                              {.category = kPlayer, .mask = ~kDebris});
+  walker.inertia = jfpx::diagonal({kLocked, kLocked, kLocked});
+  walker.friction = 0;
+  walker.can_sleep = false;
+  const jfpx::BodyId player = world.add(walker);
+
+  jfpx::BodyDef coin =
+      body(jfpx::Sphere{Real(0.5)}, {0, 1, 0}, 0, {.category = kTrigger, .mask = kPlayer});
+  coin.sensor = true;
+  coin.user_data = 42;  // an index of the game's own objects
+  world.add(coin);
+
+  const jfpx::BodyId crate = world.add(body(jfpx::Box{{1, 1, 1}}, {0, 1, -6}, 30, {kDebris}));
+
+  constexpr Real kDt = Real(1) / 60;
+  Real accumulator = 0;
+  jfpx::Vec3 before, after;
+  for (int frame = 0; frame < 288; ++frame) {  // 144 frames per second
+    accumulator += Real(1) / 144;
+    while (accumulator >= kDt) {
+      accumulator -= kDt;
+      jfpx::BodyState walk = world.state(player);
+      before = walk.position;
+      walk.velocity = {0, walk.velocity.y, -3};
+      world.set_state(player, walk);
+
+      jfpx::BodyState ride = world.state(lift);
+      if (ride.position.y > 1) {
+        ride.velocity.y = -1;
+        world.set_state(lift, ride);
+      }
+
+      if (world.step().non_finite) return 1;
+      after = world.state(player).position;
+
+      // Events are read after the step; bodies may be removed here.
+      std::vector<jfpx::BodyId> taken;
+      for (const jfpx::ContactEvent& event : world.contact_events()) {
+        if (event.phase != jfpx::ContactPhase::begin) continue;
+        for (const jfpx::BodyId id : {event.a, event.b}) {
+          if (world.contains(id) && world.sensor(id)) taken.push_back(id);
+        }
+      }
+      for (const jfpx::BodyId id : taken) {
+        std::printf("took object %llu\n", static_cast<unsigned long long>(world.user_data(id)));
+        world.remove(id);
+      }
+    }
+  }
+  const jfpx::Vec3 drawn = interpolate(before, after, accumulator / kDt);
+  std::printf("the player is drawn at z = %.2f m\n", static_cast<double>(drawn.z));
+  std::printf("the door is open by %.1f rad\n",
+              static_cast<double>(world.joint_state(door).position));
+
+  // A shot: the first hit of a layer.
+  const auto is_debris = [&world](jfpx::BodyId id) { return world.filter(id).category == kDebris; };
+  const jfpx::Ray shot{.origin = {0, 1, 10}, .direction = {0, 0, -1}, .max_distance = 100};
+  if (const std::optional<jfpx::RayHit> hit = world.cast_ray(shot, is_debris)) {
+    apply_impulse(&world, hit->body, {0, 0, -150});
+    std::printf("shot at %.1f m: the crate moves at %.1f m/s\n", static_cast<double>(hit->distance),
+                static_cast<double>(-world.state(crate).velocity.z));
+  }
+}
