@@ -134,6 +134,13 @@ class GridTeam {
     for_each_nowait(n, f);
     sync();
   }
+  /// Calls f(thread, number of threads, sync) in each thread; all must call sync() equally often.
+  template <class F>
+  [[gnu::always_inline]] JFPX_HD void for_each_thread(const F& f) const {
+#if defined(__CUDA_ARCH__)
+    f(first(), blocks_ * kThreads, [&] { sync(); });
+#endif
+  }
   /// Calls f in one thread, without a barrier.
   template <class F>
   JFPX_HD void once(const F& f) const {

@@ -129,22 +129,79 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
   template <class Team>
   [[gnu::always_inline]] JFPX_HD void solve_crossing(const Team& team, const Sweep& sweep) const {
     visit_operation(sweep.kind(), [&](const auto& operation) {
-      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
-        bool has_rows = false;
-        for (soft_step::RowKind kind = 0; kind < kKinds; ++kind) {
-          const std::uint32_t bin = soft_step::bin_of(kind, soft_step::group_of_crossing(color));
-          const std::uint32_t first = sweep.begin[bin], rows = sweep.size(bin);
-          has_rows = has_rows || rows > 0;
-          team.for_each_nowait(rows, [&](std::uint32_t i) {
-            typename Base::RowItem item;
-            this->begin_row(sweep, first + i, &item);
-            this->is_ready(&item);
-            this->solve_row(sweep, operation, &item);
-          });
-        }
-        if (has_rows) team.sync();
+      if constexpr (kKinds == kSphereRowKinds) {
+        solve_crossing_spheres(team, sweep, operation);
+      } else {
+        solve_crossing_kinds(team, sweep, operation);
       }
     });
+  }
+
+  /// solve_crossing() if all rows are of spheres.
+  template <class Team, class Operation>
+  [[gnu::always_inline]] JFPX_HD void solve_crossing_spheres(const Team& team, const Sweep& sweep,
+                                                             const Operation& operation) const {
+    const std::uint32_t* const begin =
+        sweep.begin + soft_step::bin_of(0, soft_step::group_of_crossing(0));
+    team.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
+      for_colors(begin, thread, count, sync, [&](std::uint32_t r, const auto& row) {
+        typename Base::RowItem item;
+        this->begin_row(r, row, &item);
+        this->is_ready(&item);
+        this->solve_row(sweep, operation, &item);
+      });
+    });
+  }
+
+  /// solve_crossing() for rows of several kinds.
+  template <class Team, class Operation>
+  [[gnu::always_inline]] JFPX_HD void solve_crossing_kinds(const Team& team, const Sweep& sweep,
+                                                           const Operation& operation) const {
+    for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+      bool has_rows = false;
+      for (soft_step::RowKind kind = 0; kind < kKinds; ++kind) {
+        const std::uint32_t bin = soft_step::bin_of(kind, soft_step::group_of_crossing(color));
+        const std::uint32_t first = sweep.begin[bin], rows = sweep.size(bin);
+        has_rows = has_rows || rows > 0;
+        team.for_each_nowait(rows, [&](std::uint32_t i) {
+          typename Base::RowItem item;
+          this->begin_row(sweep, first + i, &item);
+          this->is_ready(&item);
+          this->solve_row(sweep, operation, &item);
+        });
+      }
+      if (has_rows) team.sync();
+    }
+  }
+
+  /// Calls solve(r, row) for the rows of spheres of each color with the rows of a thread, and
+  /// sync() after each color. A thread loads its next row before it solves a row.
+  /// @param begin the first rows by color, and the end
+  template <class Sync, class Solve>
+  [[gnu::always_inline]] JFPX_HD void for_colors(const std::uint32_t* begin, std::uint32_t thread,
+                                                 std::uint32_t count, const Sync& sync,
+                                                 const Solve& solve) const {
+    const std::uint32_t last = begin[soft_step::kColorsPerClass];
+    soft_step::SphereRow ahead;
+    std::uint32_t next = 0;
+    const auto load = [&](std::uint32_t color, std::uint32_t row) {
+      next = row;
+      while (next >= begin[color + 1] && begin[color + 1] < last) {
+        ++color;
+        next = begin[color] + thread;
+      }
+      if (next < last) ahead = data.sphere_rows.load(next);
+    };
+    if (begin[0] < last) load(0, begin[0] + thread);
+    for (std::uint32_t color = 0; begin[color] < last; ++color) {
+      while (next < begin[color + 1]) {
+        const soft_step::SphereRow row = ahead;
+        const std::uint32_t r = next;
+        load(color, r + count);
+        solve(r, row);
+      }
+      sync();
+    }
   }
 
   template <class Team>
@@ -229,36 +286,17 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     }
   }
 
-  /// solve_inner() if all rows are of spheres. A thread loads its next row before it solves a row.
+  /// solve_inner() if all rows are of spheres.
   template <class Threads, class Operation>
   [[gnu::always_inline]] JFPX_HD void solve_inner_spheres(const Threads& threads,
                                                           const BlockPhase& phase,
                                                           const Operation& operation,
                                                           const Motion& motion,
                                                           std::uint32_t first_place) const {
-    const std::uint32_t* const begin = motion.row_begin(0);
-    const std::uint32_t last = begin[soft_step::kColorsPerClass];
     threads.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
-      soft_step::SphereRow ahead;
-      std::uint32_t next = 0;
-      const auto load = [&](std::uint32_t color, std::uint32_t row) {
-        next = row;
-        while (next >= begin[color + 1] && begin[color + 1] < last) {
-          ++color;
-          next = begin[color] + thread;
-        }
-        if (next < last) ahead = data.sphere_rows.load(next);
-      };
-      if (begin[0] < last) load(0, begin[0] + thread);
-      for (std::uint32_t color = 0; begin[color] < last; ++color) {
-        while (next < begin[color + 1]) {
-          const soft_step::SphereRow row = ahead;
-          const std::uint32_t r = next;
-          load(color, r + count);
-          solve_inner_row(phase, operation, motion, first_place, r, row);
-        }
-        sync();
-      }
+      for_colors(motion.row_begin(0), thread, count, sync, [&](std::uint32_t r, const auto& row) {
+        solve_inner_row(phase, operation, motion, first_place, r, row);
+      });
     });
   }
 

@@ -157,6 +157,15 @@ struct RowSolver {
     item->b.start(b, d);
   }
 
+  /// begin_row() for a row of spheres that is already loaded.
+  JFPX_HD void begin_row(std::uint32_t r, const soft_step::SphereRow& row, RowItem* item) const {
+    item->row = r;
+    item->kind = soft_step::kKindOf<soft_step::SphereRow>;
+    item->sphere = row;
+    item->a.start(row.a, data);
+    item->b.start(row.b, data);
+  }
+
   JFPX_HD void begin_colored_row(const Sweep& sweep, std::uint32_t r, std::uint32_t color,
                                  RowItem* item) const {
     begin_row(sweep, r, item);
