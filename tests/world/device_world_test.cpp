@@ -279,6 +279,19 @@ TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
   }
 }
 
+/// A step whose lists are too short is repeated, and allocates memory.
+TEST_P(DeviceWorldTest, FewStepsOfAFallingHeapAreRepeated) {
+  World world = on_device(scenes::make("mixed", {.spheres = 400}));
+  const DeviceWorld& device = *WorldAccess::impl(world).device;
+  int repeated = 0;
+  for (int n = 0; n < 90; ++n) {
+    const std::uint64_t before = device.states().version;
+    world.step();
+    if (device.states().version != before) ++repeated;
+  }
+  EXPECT_LE(repeated, 18);
+}
+
 /// So many contacts that a GPU uses all of its multiprocessors.
 TEST_P(DeviceWorldTest, ManyBodiesHaveTheBitsOfTheProcessor) {
   const Scene scene = scenes::make("lattice", {.spheres = 4096});

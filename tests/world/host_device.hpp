@@ -84,6 +84,11 @@ class HostTeam {
   void for_each(std::uint32_t n, const F& f) const {
     for_each_nowait(n, f);
   }
+  /// With one thread.
+  template <class F>
+  void for_each_thread(const F& f) const {
+    f(0u, 1u, [] {});
+  }
   template <class F>
   void once(const F& f) const {
     f();

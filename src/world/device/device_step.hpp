@@ -393,7 +393,7 @@ class DeviceStep final : public DeviceWorld {
   /// Grows the lists that were too short, with slack. Steps in a queue get more slack, because the
   /// host must perform all steps after one whose lists are too short.
   void grow_lists(const Capacity& needed) {
-    capacity_.grow(needed, is_queued_);
+    capacity_.grow(needed, is_queued_, data_.step.bodies.count);
     is_ready_ = false;
     ++changes_;
   }

@@ -39,14 +39,18 @@ struct Capacity {
   std::uint32_t indices = 0;        ///< solver indices of a world with blocks
   std::uint32_t unused = 0;         ///< instead of padding
 
-  /// Grows capacities below `needed`, with slack. @param doubles reserves twice the need
-  void grow(const Capacity& needed, bool doubles) {
-    const auto grow_one = [doubles](auto* capacity, auto count) {
-      if (count <= *capacity) return;
+  /// Gives each list room for `needed`, if it is not 0, and slack, so that few steps are repeated
+  /// while a heap falls: a quarter of the need, but as much as the need for lists of less than half
+  /// an item a body.
+  /// @param doubles the slack is as much as the need
+  void grow(const Capacity& needed, bool doubles, std::size_t bodies) {
+    const auto grow_one = [&](auto* capacity, auto count) {
+      if (count == 0) return;
       using Count = decltype(count);
-      const std::uint64_t wanted = std::uint64_t{count} + (doubles ? count : count / 4) + 64;
-      *capacity =
-          static_cast<Count>(std::min(wanted, std::uint64_t{std::numeric_limits<Count>::max()}));
+      const std::uint64_t need = count, half = bodies / 2;
+      const std::uint64_t slack = doubles ? need : std::max(need / 4, std::min(need, half));
+      const std::uint64_t most = std::numeric_limits<Count>::max();
+      *capacity = std::max(*capacity, static_cast<Count>(std::min(need + slack + 64, most)));
     };
     grow_one(&pairs, needed.pairs);
     grow_one(&spheres, needed.spheres);
