@@ -5,6 +5,7 @@ import copy
 import json
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import zlib
@@ -281,6 +282,25 @@ def test_a_file_that_cannot_be_written_is_an_error(tmp_path):
         jfpx.Scene().view().save(tmp_path / "no_folder" / "scene.html")
 
 
+@pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="no limits of file sizes")
+def test_a_full_disk_keeps_the_file_of_before(tmp_path):
+    import resource
+
+    path = tmp_path / "scene.html"
+    path.write_text("before")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+        with pytest.raises(jfpx.FileError, match="too large"):
+            jfpx.Scene().view().save(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert path.read_text() == "before"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["scene.html"]
+
+
 def test_without_anywidget_the_error_names_the_command():
     program = """
 import sys
@@ -346,10 +366,15 @@ def test_a_browser_draws_the_page(tmp_path):
     scene = jfpx.Scene({"bodies": [{"shape": shape, "position": [3 * i, 1, 0]} for i, shape in enumerate(shapes)] +
                         [{"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0}]})
     scene.view(np.zeros((2, 3, 3))).save(tmp_path / "scene.html")
-    done = subprocess.run(
-        [CHROMIUM, "--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
-         "--enable-unsafe-swiftshader", f"--user-data-dir={tmp_path}/profile", "--virtual-time-budget=3000", "--dump-dom",
-         f"file://{tmp_path}/scene.html"], capture_output=True, text=True, timeout=120)
-    page = re.sub(r"<script.*?</script>", "", done.stdout, flags=re.DOTALL)
-    assert "cannot be drawn" not in page, page
-    assert re.search(r'data-drawn="[1-9]', page) and "1/2" in page, done.stderr[-2000:]
+    for budget in (3000, 30000):  # on a busy machine, the first picture may take longer than the budget
+        done = subprocess.run(
+            [CHROMIUM, "--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+             "--enable-unsafe-swiftshader", f"--user-data-dir={tmp_path}/profile{budget}",
+             f"--virtual-time-budget={budget}", "--dump-dom", f"file://{tmp_path}/scene.html"],
+            capture_output=True, text=True, timeout=120)
+        page = re.sub(r"<script.*?</script>", "", done.stdout, flags=re.DOTALL)
+        assert "cannot be drawn" not in page, page
+        is_drawn = re.search(r'data-drawn="[1-9]', page) is not None and "1/2" in page
+        if is_drawn:
+            break
+    assert is_drawn, done.stderr[-2000:]

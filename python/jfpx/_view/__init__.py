@@ -21,6 +21,25 @@ Frame = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Positions, orientations and whether bodies are awake."""
 
 
+def _write(path: str, text: str) -> None:
+    """Writes a file that appears under its path only when it is complete. Devices and pipes are
+    written directly. Raises OSError."""
+    target = os.path.realpath(path)
+    if os.path.exists(target) and not os.path.isfile(target):
+        with open(target, "w", encoding="utf-8") as file:
+            file.write(text)
+        return
+    temporary = f"{target}.{os.getpid()}.tmp"
+    try:
+        with open(temporary, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.replace(temporary, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.remove(temporary)
+        raise
+
+
 class View:
     """A picture of bodies in 3D, of World.view(), Scene.view() or Recording.view(). As the last
     expression of a cell, a notebook (Jupyter, VS Code, Colab) shows it.
@@ -117,10 +136,9 @@ class View:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes an HTML file that any browser with WebGL 2 shows, without a network. It has the
         frames of the view, or the present state of a world. Raises FileError."""
-        path = _arrays.path(path)
+        path, text = _arrays.path(path), self.to_html()
         try:
-            with open(path, "w", encoding="utf-8") as file:
-                file.write(self.to_html())
+            _write(path, text)
         except OSError as error:
             raise FileError(f"{path}: {error.strerror or error}") from None
 
