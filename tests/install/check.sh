@@ -198,22 +198,22 @@ refused" ] || fail "$("$work/cmake/both")"
     cpack --config "$build/CPackConfig.cmake" -B "$work/packages" >"$work/cpack.txt" 2>&1 || fail "$(cat "$work/cpack.txt")"
     for package in "$work"/packages/*.deb; do dpkg -x "$package" "$work/root"; done
     depends() { dpkg-deb -f "$work"/packages/"$1"_*.deb "${2:-Depends}"; }
-    depends libjfpx0.2 | grep -q 'libstdc++6' || fail "libjfpx0.2 depends on: $(depends libjfpx0.2)"
-    depends libjfpx-dev | grep -q 'libjfpx0.2 (= ' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
-    depends jfpx-tools | grep -q 'libjfpx0.2 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
-    depends libjfpx-thesis0.2 | grep -q 'libjfpx0.2 (= ' || fail "libjfpx-thesis0.2 depends on: $(depends libjfpx-thesis0.2)"
-    depends jfpx-tools | grep -q 'libjfpx-thesis0.2 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    depends libjfpx0.3 | grep -q 'libstdc++6' || fail "libjfpx0.3 depends on: $(depends libjfpx0.3)"
+    depends libjfpx-dev | grep -q 'libjfpx0.3 (= ' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
+    depends jfpx-tools | grep -q 'libjfpx0.3 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    depends libjfpx-thesis0.3 | grep -q 'libjfpx0.3 (= ' || fail "libjfpx-thesis0.3 depends on: $(depends libjfpx-thesis0.3)"
+    depends jfpx-tools | grep -q 'libjfpx-thesis0.3 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
     if [ "$HAS_VIEWER" = ON ]; then
       depends jfpx-tools | grep -q libsdl2 || fail "jfpx-tools depends on: $(depends jfpx-tools)"
       depends jfpx-tools Recommends | grep -q 'libegl1, libgl1-mesa-dri' ||
         fail "jfpx-tools recommends: $(depends jfpx-tools Recommends)"
     fi
     if [ "$HAS_BULLET" = ON ]; then
-      depends libjfpx-bullet0.2 | grep -q 'libbullet3' || fail "libjfpx-bullet0.2 depends on: $(depends libjfpx-bullet0.2)"
+      depends libjfpx-bullet0.3 | grep -q 'libbullet3' || fail "libjfpx-bullet0.3 depends on: $(depends libjfpx-bullet0.3)"
       depends libjfpx-dev | grep -q 'libbullet-dev, pkg-config' || fail "libjfpx-dev depends on: $(depends libjfpx-dev)"
-      ! depends libjfpx0.2 | grep -q bullet || fail "libjfpx0.2 depends on Bullet"
+      ! depends libjfpx0.3 | grep -q bullet || fail "libjfpx0.3 depends on Bullet"
     fi
-    [ -s "$work/root/usr/share/doc/libjfpx0.2/copyright" ] || fail "no copyright"
+    [ -s "$work/root/usr/share/doc/libjfpx0.3/copyright" ] || fail "no copyright"
     [ -s "$work/root/usr/share/doc/jfpx/docs/world.md" ] || fail "no documents"
     [ "$(depends jfpx-doc Architecture)" = all ] || fail "jfpx-doc is for $(depends jfpx-doc Architecture)"
     ! dpkg-deb -c "$work"/packages/libjfpx-dev_*.deb | grep -q README || fail "libjfpx-dev has documents"
