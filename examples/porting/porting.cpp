@@ -24,13 +24,6 @@ jfpx::BodyDef body(const jfpx::Shape& shape, const jfpx::Vec3& position, Real ma
   return def;
 }
 
-/// Box2D's ApplyLinearImpulseToCenter() [N s], Jolt's AddImpulse().
-void apply_impulse(jfpx::World* world, jfpx::BodyId id, const jfpx::Vec3& impulse) {
-  jfpx::BodyState state = world->state(id);
-  state.velocity += impulse * (1 / world->mass(id));
-  world->set_state(id, state);
-}
-
 /// Pose for drawing, between two steps.
 jfpx::Vec3 interpolate(const jfpx::Vec3& before, const jfpx::Vec3& after, Real fraction) {
   return before + (after - before) * fraction;
@@ -119,7 +112,7 @@ int main() {
   const auto is_debris = [&world](jfpx::BodyId id) { return world.filter(id).category == kDebris; };
   const jfpx::Ray shot{.origin = {0, 1, 10}, .direction = {0, 0, -1}, .max_distance = 100};
   if (const std::optional<jfpx::RayHit> hit = world.cast_ray(shot, is_debris)) {
-    apply_impulse(&world, hit->body, {0, 0, -150});
+    world.apply_impulse(hit->body, {0, 0, -150});
     std::printf("shot at %.1f m: the crate moves at %.1f m/s\n", static_cast<double>(hit->distance),
                 static_cast<double>(-world.state(crate).velocity.z));
   }

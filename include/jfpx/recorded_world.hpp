@@ -55,6 +55,9 @@ class JFPX_API RecordedWorld {
   void apply_force(BodyId id, const Vec3& force);
   void apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point);
   void apply_torque(BodyId id, const Vec3& torque);
+  void apply_impulse(BodyId id, const Vec3& impulse);
+  void apply_impulse_at_point(BodyId id, const Vec3& impulse, const Vec3& point);
+  void apply_angular_impulse(BodyId id, const Vec3& impulse);
 
   ForceId add_force(const RecordableForce& force);
   /// Replaces the parameters of a force, like an assignment to World::force().

@@ -252,6 +252,16 @@ class JFPX_API World {
   void apply_force_at_point(BodyId id, const Vec3& force, const Vec3& point);
   void apply_torque(BodyId id, const Vec3& torque);
 
+  /// Applies an impulse [N s] at the centre of mass or at a point in the world [m], or an angular
+  /// impulse [N m s]: changes the velocities of the body at once, so that state() returns the new
+  /// ones. Vectors are in world axes. Wakes the body; has no effect on a body of mass 0. In a world
+  /// on a GPU, copies the motion of all bodies to the host, if no call since the step has done it.
+  /// @throws InvalidArgument for an unknown id, a non-finite value, or if a velocity would not
+  /// be finite; the body is then unchanged
+  void apply_impulse(BodyId id, const Vec3& impulse);
+  void apply_impulse_at_point(BodyId id, const Vec3& impulse, const Vec3& point);
+  void apply_angular_impulse(BodyId id, const Vec3& impulse);
+
   /// Adds a force that acts in every step, either one of force.hpp or a user-defined one; wakes all
   /// bodies. Forces act in the order of their addition. A force of force.hpp has no effect after
   /// its body is removed. A force must not call its World. In a world on a GPU, forces of force.hpp

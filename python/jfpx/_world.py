@@ -725,6 +725,24 @@ class World:
         that is not finite."""
         self._core.apply_torque(_arrays.body(body), _arrays.triple(torque, "torque"))
 
+    def apply_impulse(self, body: BodyId, impulse: Vector, point: Vector | None = None) -> None:
+        """Applies an impulse [N s] in world axes at a point [m] of the world or at the centre of
+        mass: changes the velocities at once. Wakes the body; has no effect on one of mass 0. Raises
+        InvalidArgument for an unknown body, a value that is not finite, or if a velocity would not
+        be finite; the body is then unchanged."""
+        impulse = _arrays.triple(impulse, "impulse")
+        if point is None:
+            self._core.apply_impulse(_arrays.body(body), impulse)
+        else:
+            self._core.apply_impulse_at_point(_arrays.body(body), impulse,
+                                              _arrays.triple(point, "point"))
+
+    def apply_angular_impulse(self, body: BodyId, impulse: Vector) -> None:
+        """Applies an angular impulse [N m s] in world axes: changes the angular velocity at once.
+        Wakes the body; has no effect on one of mass 0. Raises InvalidArgument as
+        apply_impulse()."""
+        self._core.apply_angular_impulse(_arrays.body(body), _arrays.triple(impulse, "impulse"))
+
     def add_force(self, force: Any) -> int:
         """Adds a force that acts in every step, and returns its number. Wakes all bodies.
 

@@ -106,8 +106,20 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
            [](PythonWorld& self, IdTuple id, Triple force, Triple point) {
              self.get().apply_force_at_point(to_id(id), to_vec3(force), to_vec3(point));
            })
-      .def("apply_torque", [](PythonWorld& self, IdTuple id, Triple torque) {
-        self.get().apply_torque(to_id(id), to_vec3(torque));
+      .def("apply_torque",
+           [](PythonWorld& self, IdTuple id, Triple torque) {
+             self.get().apply_torque(to_id(id), to_vec3(torque));
+           })
+      .def("apply_impulse",
+           [](PythonWorld& self, IdTuple id, Triple impulse) {
+             self.get().apply_impulse(to_id(id), to_vec3(impulse));
+           })
+      .def("apply_impulse_at_point",
+           [](PythonWorld& self, IdTuple id, Triple impulse, Triple point) {
+             self.get().apply_impulse_at_point(to_id(id), to_vec3(impulse), to_vec3(point));
+           })
+      .def("apply_angular_impulse", [](PythonWorld& self, IdTuple id, Triple impulse) {
+        self.get().apply_angular_impulse(to_id(id), to_vec3(impulse));
       });
 }
 

@@ -197,6 +197,10 @@ struct World::Impl {
     });
   }
 
+  /// Changes the velocities of a movable body. @param linear [N s] @param angular [N m s]
+  /// @throws InvalidArgument if a velocity would not be finite
+  void apply_impulse(std::uint32_t body, const Vec3& linear, const Vec3& angular);
+
   void wake(std::uint32_t body) { edited_body(body, {.wakes = true}).wake(body); }
 
   /// Wakes a body and the bodies in contact with it.

@@ -108,6 +108,37 @@ void World::apply_torque(BodyId id, const Vec3& torque) {
   impl_->edited_body(body, {.wakes = true}).apply_torque(body, torque);
 }
 
+void World::apply_impulse(BodyId id, const Vec3& impulse) {
+  const std::uint32_t body = impl_->store.require(id);
+  require_in_range("impulse", impulse, kFinite);
+  impl_->apply_impulse(body, impulse, {});
+}
+
+void World::apply_impulse_at_point(BodyId id, const Vec3& impulse, const Vec3& point) {
+  const std::uint32_t body = impl_->store.require(id);
+  require_in_range("impulse", impulse, kFinite);
+  require_in_range("point", point, kFinite);
+  impl_->apply_impulse(body, impulse, cross(point - impl_->position(body), impulse));
+}
+
+void World::apply_angular_impulse(BodyId id, const Vec3& impulse) {
+  const std::uint32_t body = impl_->store.require(id);
+  require_in_range("impulse", impulse, kFinite);
+  impl_->apply_impulse(body, {}, impulse);
+}
+
+void World::Impl::apply_impulse(std::uint32_t body, const Vec3& linear, const Vec3& angular) {
+  if (!(store.mass(body) > 0)) return;
+  BodyState state = bodies_with_states().state(body);
+  store.refresh_inertia(body);  // on a GPU, the host has not the inertia of this orientation
+  state.velocity += linear * (1 / store.mass(body));
+  state.angular_velocity += store.moving.inverse_inertia[body] * angular;
+  const std::string found = find_fault(state);
+  if (!found.empty()) throw InvalidArgument("state after the impulse: " + found);
+  edited_body(body, {.sets_state = true, .wakes = true}).set_velocities(body, state);
+  note_change();
+}
+
 Vec3 World::last_acceleration(BodyId id) const {
   return impl_->bodies().moving.last_acceleration[impl_->store.require(id)];
 }

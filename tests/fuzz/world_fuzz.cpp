@@ -181,6 +181,8 @@ void push(Bytes& bytes, Twins& twins) {
   require(finite || !pushed, "a force that is not finite is refused");
   twins.both([&](World& w) { w.apply_force_at_point(id, force, point); });
   twins.both([&](World& w) { w.apply_torque(id, force); });
+  twins.both([&](World& w) { w.apply_impulse_at_point(id, force, point); });
+  twins.both([&](World& w) { w.apply_angular_impulse(id, force); });
 }
 
 void change_forces(Bytes& bytes, Twins& twins) {

@@ -394,6 +394,22 @@ def test_forces_of_one_step_act_once():
     np.testing.assert_array_equal(world.velocities, first.velocities)
 
 
+def test_impulses_change_velocities_at_once():
+    world = jfpx.World({"bodies": [FREE], "dt": 0.01})
+    ball, = world.bodies
+    mass = world.mass(ball)
+    world.apply_impulse(ball, (1, 0, 0))
+    assert world.velocities[0] == pytest.approx([1 / mass, 0, 0])
+    world.apply_impulse(ball, (0, 1, 0), point=world.positions[0] + (0, 0, 0.25))
+    assert world.velocities[0] == pytest.approx([1 / mass, 1 / mass, 0])
+    first = world.states().angular_velocities[0]
+    assert first[0] < 0 and first[1:] == pytest.approx([0, 0])
+    world.apply_angular_impulse(ball, (0.25, 0, 0))
+    assert world.states().angular_velocities[0] == pytest.approx([0, 0, 0], abs=1e-6)
+    with pytest.raises(jfpx.InvalidArgument, match="impulse"):
+        world.apply_impulse(ball, (float("nan"), 0, 0))
+
+
 def test_a_recording_has_the_states_of_the_run(tmp_path, dtype):
     path = tmp_path / "run.rec"
     world = jfpx.World(jfpx.Scene.named("pile", spheres=60, dtype=dtype))

@@ -371,7 +371,7 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
     int uploads = 0;
     for (int n = 0; n < scene_steps(60); ++n) {
       for (std::uint64_t changes = 1 + random.below(3); changes > 0; --changes) {
-        const std::uint64_t action = random.below(18);
+        const std::uint64_t action = random.below(20);
         const auto at = [&](const World& world, std::uint64_t i) {
           return world.bodies()[i % world.bodies().size()];
         };
@@ -408,6 +408,11 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
             if (other != id) world->set_pair_ignored(id, other, !world->pair_ignored(id, other));
           }
           if (action == 12 && world->mass(id) > 0) world->set_mass(id, 0.3_r + absolute(force.z));
+          if (action == 18) world->apply_impulse_at_point(id, force, def.position);
+          if (action == 19) {
+            world->apply_impulse(id, force);
+            world->apply_angular_impulse(id, force);
+          }
           if (action == 13) {
             world->set_inertia(id, diagonal({3 + 0.1_r * absolute(force.x), 4, 5}));
           }

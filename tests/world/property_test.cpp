@@ -6,7 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <string>
@@ -134,6 +136,103 @@ TEST_P(Property, MassAndInertiaDivideForceAndTorque) {
   EXPECT_NEAR(world.inertia(id)(2, 2), 1.6, 1e-6);
   world.set_mass(id, 10);
   EXPECT_NEAR(world.inertia(id)(2, 2), 4, 1e-6);
+}
+
+/// The vector turned by the quaternion, or back if sign is -1, in double.
+std::array<double, 3> turned(const Quat& q, const std::array<double, 3>& v, double sign) {
+  const double w = q.w, x = sign * static_cast<double>(q.x), y = sign * static_cast<double>(q.y),
+               z = sign * static_cast<double>(q.z);
+  const double tx = 2 * (y * v[2] - z * v[1]), ty = 2 * (z * v[0] - x * v[2]),
+               tz = 2 * (x * v[1] - y * v[0]);
+  return {v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz,
+          v[2] + w * tz + x * ty - y * tx};
+}
+
+/// The inertia in body axes times a vector in world axes, in double.
+std::array<double, 3> angular_momentum(const World& world, BodyId id, const Vec3& velocity) {
+  const Quat q = world.state(id).orientation;
+  const Mat3 inertia = world.inertia(id);
+  const std::array<double, 3> local = turned(q, {velocity.x, velocity.y, velocity.z}, -1);
+  std::array<double, 3> momentum{};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      momentum[static_cast<std::size_t>(row)] +=
+          static_cast<double>(inertia(row, column)) * local[static_cast<std::size_t>(column)];
+    }
+  }
+  return turned(q, momentum, 1);
+}
+
+TEST_P(Property, ImpulsesChangeMomentaAsInDouble) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  for (int round = 0; round < 200; ++round) {
+    const BodyDef def = test::random_body(&random, 3);
+    World world = world_with({def});
+    const BodyId id = world.bodies()[0];
+    const BodyState before = world.state(id);
+    const Vec3 impulse = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
+    const Vec3 point = random.uniform_in_box({-5, -5, -5}, {5, 5, 5});
+    const Vec3 spin = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
+    world.apply_impulse(id, impulse);
+    world.apply_impulse_at_point(id, impulse, point);
+    world.apply_angular_impulse(id, spin);
+    const BodyState after = world.state(id);
+    ASSERT_EQ(after.position, before.position);
+    ASSERT_EQ(after.orientation, before.orientation);
+    const double mass = world.mass(id);
+    if (!(mass > 0)) {
+      ASSERT_EQ(after.velocity, before.velocity);
+      ASSERT_EQ(after.angular_velocity, before.angular_velocity);
+      continue;
+    }
+    const std::array<double, 3> j{impulse.x, impulse.y, impulse.z}, s{spin.x, spin.y, spin.z},
+        v0{before.velocity.x, before.velocity.y, before.velocity.z},
+        v1{after.velocity.x, after.velocity.y, after.velocity.z},
+        r{static_cast<double>(point.x) - static_cast<double>(before.position.x),
+          static_cast<double>(point.y) - static_cast<double>(before.position.y),
+          static_cast<double>(point.z) - static_cast<double>(before.position.z)};
+    const std::array<double, 3> l0 = angular_momentum(world, id, before.angular_velocity),
+                                l1 = angular_momentum(world, id, after.angular_velocity);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t a = (i + 1) % 3, b = (i + 2) % 3;
+      ASSERT_NEAR(mass * (v1[i] - v0[i]), 2 * j[i], 1e-4) << round;
+      ASSERT_NEAR(l1[i] - l0[i], s[i] + r[a] * j[b] - r[b] * j[a], 5e-3) << round;
+    }
+  }
+}
+
+TEST_P(Property, ImpulsesWakeBodiesAndRefuseInfiniteVelocities) {
+  BodyDef wall = resting_box({9, 0, 0}), moved = resting_box({-9, 0, 0});
+  wall.mass = moved.mass = 0;
+  moved.kinematic = true;
+  World world = world_with({resting_box({}), wall, moved});
+  const BodyId box = world.bodies()[0];
+  for (const BodyId id : {world.bodies()[1], world.bodies()[2]}) {
+    world.apply_impulse(id, {1, 2, 3});
+    world.apply_angular_impulse(id, {1, 2, 3});
+    EXPECT_EQ(world.state(id).velocity, Vec3{});
+    EXPECT_EQ(world.state(id).angular_velocity, Vec3{});
+    EXPECT_FALSE(world.awake(id));
+  }
+  world.set_acceleration(box, {});
+  for (int n = 0; n < 600 && world.awake(box); ++n) world.step();
+  ASSERT_FALSE(world.awake(box));
+  world.apply_impulse(box, {1, 0, 0});
+  EXPECT_TRUE(world.awake(box));
+
+  const std::uint64_t hash = world.state_hash();
+  const Real highest = std::numeric_limits<Real>::max();
+  EXPECT_NE(complaint([&] { world.apply_impulse(box, {kNan, 0, 0}); }), "");
+  EXPECT_NE(complaint([&] { world.apply_impulse_at_point(box, {}, {0, kInfinity, 0}); }), "");
+  EXPECT_NE(complaint([&] { world.apply_angular_impulse(box, {0, kNan, 0}); }), "");
+  EXPECT_NE(complaint([&] { world.apply_impulse({99, 0}, {}); }), "");
+  world.set_mass(box, 0.25_r);
+  const std::string message = complaint([&] { world.apply_impulse(box, {highest, 0, 0}); });
+  EXPECT_NE(message.find("state after the impulse: velocity"), std::string::npos) << message;
+  EXPECT_NE(complaint([&] { world.apply_angular_impulse(box, {0, highest, 0}); }), "");
+  EXPECT_EQ(world.state_hash(), hash);
 }
 
 TEST_P(Property, MassesDecideACollision) {

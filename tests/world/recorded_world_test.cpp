@@ -82,7 +82,7 @@ void change(RecordedWorld& world, Random* random) {
   const Real number = random->uniform(0.1_r, 0.9_r);
   const bool movable = world.world().mass(id) > 0;
   const std::span<const ForceId> forces = world.world().forces();
-  switch (random->below(19)) {
+  switch (random->below(22)) {
     case 0:
       world.add(random_body(random, 3));
       break;
@@ -132,6 +132,15 @@ void change(RecordedWorld& world, Random* random) {
       break;
     case 15:
       world.apply_torque(id, vector);
+      break;
+    case 18:
+      world.apply_impulse(id, vector);
+      break;
+    case 19:
+      world.apply_impulse_at_point(id, vector, vector);
+      break;
+    case 20:
+      world.apply_angular_impulse(id, vector);
       break;
     case 16:
       world.add_force(random_force(random, bodies));

@@ -264,6 +264,12 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   moving.mean_motion[i] = 2 * sleep_.epsilon;  // wake_by_contact() copies it to bodies in contact
 }
 
+void BodyStore::set_velocities(std::uint32_t i, const BodyState& state) {
+  moving.velocity[i] = state.velocity;
+  moving.angular_velocity[i] = state.angular_velocity;
+  wake(i);
+}
+
 void BodyStore::set_filter(std::uint32_t i, const CollisionFilter& filter) noexcept {
   if (properties_.filter[i] != CollisionFilter{}) --filtered_count_;
   properties_.filter[i] = filter;

@@ -82,6 +82,10 @@ class BodyStore {
   /// it has a velocity; the velocities of an immovable body remain 0.
   void set_state(std::uint32_t body, const BodyState& state);
 
+  /// Replaces the velocities of a movable body and wakes it. Position and orientation keep their
+  /// bits, which set_state() might round.
+  void set_velocities(std::uint32_t body, const BodyState& state);
+
   /// Adds to the force or torque of the next step and wakes the body (erratum E29). Has no effect
   /// on a body of mass 0.
   void apply_force(std::uint32_t body, const Vec3& force);

@@ -99,6 +99,15 @@ void RecordedWorld::apply_force_at_point(BodyId id, const Vec3& force, const Vec
 void RecordedWorld::apply_torque(BodyId id, const Vec3& torque) {
   impl_->call("apply_torque", &World::apply_torque, id, torque);
 }
+void RecordedWorld::apply_impulse(BodyId id, const Vec3& impulse) {
+  impl_->call("apply_impulse", &World::apply_impulse, id, impulse);
+}
+void RecordedWorld::apply_impulse_at_point(BodyId id, const Vec3& impulse, const Vec3& point) {
+  impl_->call("apply_impulse_at_point", &World::apply_impulse_at_point, id, impulse, point);
+}
+void RecordedWorld::apply_angular_impulse(BodyId id, const Vec3& impulse) {
+  impl_->call("apply_angular_impulse", &World::apply_angular_impulse, id, impulse);
+}
 ForceId RecordedWorld::add_force(const RecordableForce& force) {
   return impl_->call("add_force", &recorded::add_force, force);
 }
