@@ -141,13 +141,14 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
   template <class Team, class Operation>
   [[gnu::always_inline]] JFPX_HD void solve_crossing_spheres(const Team& team, const Sweep& sweep,
                                                              const Operation& operation) const {
+    constexpr soft_step::RowKind kKind = soft_step::kKindOf<soft_step::SphereRow>;
     const std::uint32_t* const begin =
-        sweep.begin + soft_step::bin_of(0, soft_step::group_of_crossing(0));
+        sweep.begin + soft_step::bin_of(kKind, soft_step::group_of_crossing(0));
     team.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
       for_colors(begin, thread, count, sync, [&](std::uint32_t r, const auto& row) {
         typename Base::RowItem item;
         this->begin_row(r, row, &item);
-        this->is_ready(&item);
+        this->read_bodies(&item);
         this->solve_row(sweep, operation, &item);
       });
     });
@@ -166,7 +167,7 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
         team.for_each_nowait(rows, [&](std::uint32_t i) {
           typename Base::RowItem item;
           this->begin_row(sweep, first + i, &item);
-          this->is_ready(&item);
+          this->read_bodies(&item);
           this->solve_row(sweep, operation, &item);
         });
       }

@@ -127,7 +127,7 @@ struct RowSolver {
       RowItem item;
       begin_row(sweep, data.overflow[k], &item);
       item.a.before = item.a.after = item.b.before = item.b.after = ticket;
-      is_ready(&item);
+      read_bodies(&item);
       solve_row(sweep, operation, &item);
     }
   }
@@ -180,6 +180,12 @@ struct RowSolver {
 
   JFPX_HD bool is_ready(RowItem* item) const {
     if (item->row == kNone) return true;
+    read_bodies(item);
+    return item->a.is_ready && item->b.is_ready;
+  }
+
+  /// Reads the motion of the bodies of a row that is not yet known to be ready.
+  JFPX_HD void read_bodies(RowItem* item) const {
     const auto read = [&](ItemBody* body) {
       if (body->is_ready) return;
       visit_row(item->kind, [&](auto type) {
@@ -188,7 +194,6 @@ struct RowSolver {
     };
     read(&item->a);
     read(&item->b);
-    return item->a.is_ready && item->b.is_ready;
   }
 
   template <class Operation>
