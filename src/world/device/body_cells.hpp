@@ -16,18 +16,17 @@ inline namespace JFPX_ABI {
 namespace device {
 
 /// Tickets: sequence numbers of the updates of a body in a world of one block. Each sweep has
-/// kPerSweep tickets: one before the overflow, one before the colors, and one for the row of each
-/// color. A row waits for the ticket of the previous row of the body, then publishes its own
-/// ticket. Colors without a row of the body have no tickets. Overflow rows do not change the
-/// ticket, because barriers enclose them.
+/// kPerSweep tickets: one before the colors, and one for the row of each color. A row waits for the
+/// ticket of the previous row of the body, then publishes its own ticket. Colors without a row of
+/// the body have no tickets. Overflow rows do not change the ticket, because barriers enclose them.
 struct Tickets {
-  static constexpr std::uint32_t kPerSweep = soft_step::kColorsPerClass + 2u;
+  static constexpr std::uint32_t kPerSweep = soft_step::kColorsPerClass + 1u;
 
   std::uint64_t colors = 0;  ///< of the body's rows
   std::uint32_t first = 0;   ///< the ticket before the colors
 
   JFPX_HD Tickets(std::uint32_t sweep, std::uint64_t row_colors)
-      : colors(row_colors), first(sweep * kPerSweep + 1) {}
+      : colors(row_colors), first(sweep * kPerSweep) {}
 
   /// The ticket after the row of a color.
   JFPX_HD std::uint32_t after(std::uint32_t color) const { return first + 1 + color; }
