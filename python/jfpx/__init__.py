@@ -23,7 +23,7 @@ from ._view import View
 from ._world import (BEGIN, END, STAY, ContactEvents, RayHit, RayHits, StepReport, World,
                      WorldContacts)
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 __all__ = [
     "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyId", "BodyState", "Bungee",
