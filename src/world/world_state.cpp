@@ -118,7 +118,8 @@ void World::apply_impulse_at_point(BodyId id, const Vec3& impulse, const Vec3& p
   const std::uint32_t body = impl_->store.require(id);
   require_in_range("impulse", impulse, kFinite);
   require_in_range("point", point, kFinite);
-  impl_->apply_impulse(body, impulse, cross(point - impl_->position(body), impulse));
+  const Vec3 arm = point - impl_->bodies_with_states().moving.position[body];
+  impl_->apply_impulse(body, impulse, cross(arm, impulse));
 }
 
 void World::apply_angular_impulse(BodyId id, const Vec3& impulse) {

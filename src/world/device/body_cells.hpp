@@ -250,9 +250,10 @@ class BodyCells {
   std::uint32_t i_;
 };
 
-/// Access to the motion of a body in a world with blocks, whose accesses barriers divide: the
-/// interface and the memory of BodyCells, without tickets and versions. The velocities and the
-/// masses of a body are one sector of the cache, because crossing rows access bodies in any order.
+/// Access to the motion of a body in a world with blocks, where barriers separate all accesses. It
+/// has the interface and the memory of BodyCells, without tickets and versions. The velocities and
+/// the masses of a body are consecutive in memory, because crossing rows access bodies in any
+/// order.
 class BodyMotion {
  public:
   static constexpr bool kHasMasses = true;

@@ -390,8 +390,8 @@ class DeviceStep final : public DeviceWorld {
     send(&Progress::held, 0u);
   }
 
-  /// Grows the lists that were too short, with slack. Steps in a queue get more slack, because the
-  /// host must perform all steps after one whose lists are too short.
+  /// Gives the lists of a step that has failed room and slack. Steps in a queue get more slack,
+  /// because the host must perform all steps after one whose lists are too short.
   void grow_lists(const Capacity& needed) {
     capacity_.grow(needed, is_queued_, data_.step.bodies.count);
     is_ready_ = false;

@@ -318,7 +318,6 @@ struct StepData {
     const BallProperties& ball = balls[index];
     return {body.inverse_mass, body.inverse_inertia, ball.radius, ball.friction, ball.restitution};
   }
-  /// @param index solver index
   /// The contacts of the step in progress, and those of the last completed step. The device selects
   /// them, because the host does not track the number of completed steps.
   JFPX_HD const DeviceContacts& now() const { return contacts_of[parity()]; }
