@@ -19,14 +19,14 @@ jfpx_add_test(bullet_contract_test INTERNAL SOURCES
   bullet/plane_gap_test.cpp
   bullet/replaced_test.cpp
   bullet/situations_test.cpp
-  bullet/sphere_box_test.cpp
+  bullet/convex_distance_test.cpp
   bullet/sphere_plane_test.cpp
   bullet/stats_test.cpp
   bullet/unordered_commit_test.cpp
   bullet/user_code_test.cpp
   LINK jfpx_bullet jfpx_scenes)
 # Has private names of other tests.
-set_source_files_properties(bullet/sphere_box_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+set_source_files_properties(bullet/convex_distance_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 jfpx_add_test(bullet_verify_test INTERNAL SOURCES
   bullet/fused_test.cpp
   bullet/fused_unit.cpp

@@ -15,11 +15,11 @@ namespace bullet {
 /// Reason why an entire dispatch ran in Bullet's own code. The bits are identical either way.
 enum class Fallback : std::uint8_t {
   none,
-  small_batch,  ///< fewer pairs than minimum_batch
-  no_spheres,  ///< fewer than two spheres, fewer than 64 pairs with concave shapes and 64 compounds
-               ///< of spheres, and one thread
-  near_callback,    ///< the user has set a near callback that does not call
-                    ///< CollisionDispatcher::defaultNearCallback()
+  small_batch,    ///< fewer pairs than minimum_batch
+  no_spheres,     ///< fewer than two spheres, fewer than 64 pairs with concave shapes, compounds or
+                  ///< convex shapes that GJK tests, and one thread
+  near_callback,  ///< the user has set a near callback that does not call
+                  ///< CollisionDispatcher::defaultNearCallback()
   create_function,  ///< the user has registered another SPHERE/SPHERE create function
   continuous,       ///< m_dispatchFunc is not DISPATCH_DISCRETE
   nested,           ///< called by a callback inside another dispatch of this dispatcher
@@ -75,7 +75,7 @@ struct DispatchStats {
   std::uint64_t written = 0;        ///< sphere pairs updated without Bullet's algorithm
   std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
   std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
-  std::uint64_t convex_pairs = 0;   ///< other pairs updated by Bullet's algorithms on any thread
+  std::uint64_t convex_pairs = 0;   ///< other pairs of convex shapes and planes, on any thread
   std::uint64_t sphere_concaves =
       0;  ///< spheres on meshes and height fields, without Bullet's algorithm
   std::uint64_t concave_pairs = 0;   ///< other shapes on meshes and height fields, on any thread

@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/floating_point.hpp"
+#include "src/bullet/dispatch/compound_commit.hpp"
 #include "src/bullet/dispatch/contact_point.hpp"
 #include "src/bullet/dispatch/pair_check.hpp"
 #include "src/bullet/exact_class.hpp"
@@ -81,13 +82,16 @@ bool has_callbacks() {
          gContactAddedCallback != nullptr;
 }
 
-/// Whether pairs with concave shapes, or spheres in compounds, are so many that a batch without
-/// other spheres gains with one thread.
-bool gains_without_spheres(const SphereBatch& batch) {
+/// Whether pairs with concave shapes, convex shapes or compounds, or spheres in compounds, are so
+/// many that a batch without other spheres gains with one thread.
+bool gains_without_spheres(const SphereBatch& batch, std::span<const btBroadphasePair> pairs) {
   std::size_t wanted = 64;
   if (batch.wrapped_spheres() >= wanted) return true;
-  for (std::size_t i = 0; i < batch.pairs().size(); ++i) {
-    if (is_concave(batch.kind(i)) && --wanted == 0) return true;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const PairKind kind = batch.kind(i);
+    const bool gains = is_concave(kind) || kind == PairKind::convex ||
+                       (kind == PairKind::other && is_compound_algorithm(pairs[i].m_algorithm));
+    if (gains && --wanted == 0) return true;
   }
   return false;
 }
@@ -137,7 +141,7 @@ bool BatchEngine::prepare(btCollisionDispatcher& dispatcher, const DispatcherTra
     const std::size_t spheres =
         batch_.gather(pairs_, {&dispatcher, traits.reports_releases}, pool_);
     // Most pairs of other shapes gain only from several threads.
-    if (spheres < 2 && pool_.threads() == 1 && !gains_without_spheres(batch_)) {
+    if (spheres < 2 && pool_.threads() == 1 && !gains_without_spheres(batch_, pairs_)) {
       *fallback = Fallback::no_spheres;
       return false;
     }

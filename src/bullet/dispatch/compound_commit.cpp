@@ -319,7 +319,7 @@ class CompoundPair {
       is_swapped_ ? result->setBody1Wrap(&child) : result->setBody0Wrap(&child);
       is_swapped_ ? result->setShapeIdentifiersB(-1, pair.first.number)
                   : result->setShapeIdentifiersA(-1, pair.first.number);
-      pair.algorithm->processCollision(&child, is_swapped_ ? &a_ : &b_, dispatch_.info, result);
+      process(pair, child, is_swapped_ ? a_ : b_, result);
     } else {
       const btCollisionObjectWrapper first = pair.first.wrapper(a_),
                                      second = pair.second.wrapper(b_);
@@ -327,10 +327,19 @@ class CompoundPair {
       result->setBody1Wrap(&second);
       result->setShapeIdentifiersA(-1, pair.first.number);
       result->setShapeIdentifiersB(-1, pair.second.number);
-      pair.algorithm->processCollision(&first, &second, dispatch_.info, result);
+      process(pair, first, second, result);
     }
     result->setBody0Wrap(&a_);
     result->setBody1Wrap(&b_);
+  }
+
+  void process(const ChildPair& pair, const btCollisionObjectWrapper& first,
+               const btCollisionObjectWrapper& second, btManifoldResult* result) const {
+    if (pair.link.kind() == PairKind::convex &&
+        update_convex(pair.link.manifold(), first, second, result)) {
+      return;
+    }
+    pair.algorithm->processCollision(&first, &second, dispatch_.info, result);
   }
 
   const ConvexDispatch& dispatch_;

@@ -1,18 +1,18 @@
 /// Specialization of btManifoldResult::addContactPoint for two spheres (btManifoldResult.cpp of
-/// Bullet 3.24), and of btConvexConvexAlgorithm for a sphere and a box. The vector arithmetic uses
+/// Bullet 3.24), and of btConvexConvexAlgorithm without perturbation. The vector arithmetic uses
 /// Bullet's inline functions, so the operations are the same.
 #include "src/bullet/dispatch/contact_point.hpp"
 
 #include <jfpx/math.hpp>
 
 #include "src/bullet/dispatch/body_wrapper.hpp"
+#include "src/bullet/dispatch/convex_distance.hpp"
 #include "src/bullet/dispatch/plane_gap.hpp"
-#include "src/bullet/dispatch/sphere_box.hpp"
 #include "src/bullet/dispatch/sphere_plane.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
-#include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
+#include <BulletCollision/CollisionShapes/btConvexShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
@@ -126,33 +126,31 @@ bool update_sphere_plane(btPersistentManifold* manifold, const btCollisionObject
   return true;
 }
 
-bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
-                       const btCollisionObject& body_b, bool sphere_first) {
-  const auto* shape_a = static_cast<const btConvexInternalShape*>(body_a.getCollisionShape());
-  const auto* shape_b = static_cast<const btConvexInternalShape*>(body_b.getCollisionShape());
-  const btConvexInternalShape* box = sphere_first ? shape_b : shape_a;
-  SphereBoxInput input = {.pose_a = body_a.getWorldTransform(),
-                          .pose_b = body_b.getWorldTransform(),
-                          .margin_a = shape_a->getMargin(),
-                          .margin_b = shape_b->getMargin(),
-                          .core = box->getImplicitShapeDimensions(),
-                          .sphere_first = sphere_first,
-                          .maximum_distance_squared = 0};
-  const btScalar extended_distance =
-      input.margin_a + input.margin_b + manifold->getContactBreakingThreshold();
-  input.maximum_distance_squared = extended_distance * extended_distance;
-  SphereBoxContact contact;
-  const SphereBoxResult answer = find_closest_points(input, &contact);
-  if (answer == SphereBoxResult::unknown) return false;
-  if (answer == SphereBoxResult::apart && manifold->getNumContacts() == 0) return true;
+bool update_convex(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                   const btCollisionObject& body_b) {
   const btCollisionObjectWrapper a = wrapper_of(body_a);
   const btCollisionObjectWrapper b = wrapper_of(body_b);
   btManifoldResult result(&a, &b);
-  result.setPersistentManifold(manifold);
-  if (answer == SphereBoxResult::contact) {
-    result.addContactPoint(contact.normal_on_b, contact.point_on_b, contact.distance);
+  return update_convex(manifold, a, b, &result);
+}
+
+bool update_convex(btPersistentManifold* manifold, const btCollisionObjectWrapper& a,
+                   const btCollisionObjectWrapper& b, btManifoldResult* result) {
+  DetectorContact contact;
+  const DetectorResult answer =
+      find_closest_points({.shape_a = static_cast<const btConvexShape&>(*a.getCollisionShape()),
+                           .shape_b = static_cast<const btConvexShape&>(*b.getCollisionShape()),
+                           .pose_a = a.getWorldTransform(),
+                           .pose_b = b.getWorldTransform(),
+                           .threshold = manifold->getContactBreakingThreshold()},
+                          &contact);
+  if (answer == DetectorResult::unknown) return false;
+  if (answer == DetectorResult::apart && manifold->getNumContacts() == 0) return true;
+  result->setPersistentManifold(manifold);
+  if (answer == DetectorResult::contact) {
+    result->addContactPoint(contact.normal_on_b, contact.point_on_b, contact.distance);
   }
-  result.refreshContactPoints();
+  result->refreshContactPoints();
   return true;
 }
 

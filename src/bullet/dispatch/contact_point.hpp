@@ -8,6 +8,8 @@
 #include "src/bullet/dispatch/packed_body.hpp"
 
 class btCollisionObject;
+struct btCollisionObjectWrapper;
+class btManifoldResult;
 class btPersistentManifold;
 
 namespace jfpx {
@@ -39,11 +41,16 @@ void write_contact(btPersistentManifold* manifold, const PairContact& contact, c
 void write_contact(btPersistentManifold* manifold, const PairContact& contact, const PackedBody& a,
                    const PackedBody& b, const SphereInstance& sphere_b);
 
-/// Updates the manifold of a sphere and a box, in either order, like btConvexConvexAlgorithm
-/// without perturbation. The shapes must be exactly btSphereShape and btBoxShape.
-/// @return false, without a change, if the pair needs Bullet's penetration depth solver
-bool update_sphere_box(btPersistentManifold* manifold, const btCollisionObject& body_a,
-                       const btCollisionObject& body_b, bool sphere_first);
+/// Updates the manifold of two convex shapes, which must be exactly classes of Bullet, like a
+/// btConvexConvexAlgorithm that owns it and has no perturbation.
+/// @return false, without a change, if the pair needs Bullet's penetration depth solver, or
+///   find_closest_points() does not know its shapes
+bool update_convex(btPersistentManifold* manifold, const btCollisionObject& body_a,
+                   const btCollisionObject& body_b);
+/// The same for shapes with other poses than their bodies.
+/// @param result for both wrappers
+bool update_convex(btPersistentManifold* manifold, const btCollisionObjectWrapper& a,
+                   const btCollisionObjectWrapper& b, btManifoldResult* result);
 
 /// Updates the manifold of a sphere and a plane like btConvexPlaneCollisionAlgorithm. The shapes
 /// must be exactly btSphereShape and btStaticPlaneShape.

@@ -38,24 +38,23 @@ struct ShapeTraits {
   unsigned a, b;
 };
 
-/// Updates a sphere and a box or plane without Bullet's algorithm. Returns false, without a change,
-/// for other shapes and for contacts that need Bullet's algorithm.
-bool update_sphere(const SphereBatch& batch, std::size_t i, const ShapeTraits& traits,
-                   CommitCounts* counts) {
-  const bool sphere_first = (traits.a & kSphere) != 0;
-  const unsigned other = sphere_first ? traits.b : traits.a;
-  if (((traits.a | traits.b) & kSphere) == 0) return false;
+/// Updates two convex shapes, or a sphere and a plane, without Bullet's algorithm. Returns false,
+/// without a change, for other shapes and for contacts that need Bullet's algorithm.
+bool update_without_algorithm(const SphereBatch& batch, std::size_t i, const ShapeTraits& traits,
+                              CommitCounts* counts) {
   btPersistentManifold* manifold = batch.manifold(i);
   const btCollisionObject &a = *batch.body_a(i), &b = *batch.body_b(i);
-  if ((other & kBox) != 0 && update_sphere_box(manifold, a, b, sphere_first)) {
-    ++counts->sphere_boxes;
+  const unsigned either = traits.a | traits.b;
+  if (batch.kind(i) == PairKind::convex) {
+    if (!update_convex(manifold, a, b)) return false;
+    ++((either & kSphere) != 0 && (either & kBox) != 0 ? counts->sphere_boxes
+                                                       : counts->convex_pairs);
     return true;
   }
-  if ((other & kPlane) != 0 && update_sphere_plane(manifold, a, b, sphere_first)) {
-    ++counts->sphere_planes;
-    return true;
-  }
-  return false;
+  if ((either & kSphere) == 0 || (either & kPlane) == 0) return false;
+  if (!update_sphere_plane(manifold, a, b, (traits.a & kSphere) != 0)) return false;
+  ++counts->sphere_planes;
+  return true;
 }
 
 /// Whether pair i is a box far from a plane, without contact points.
@@ -100,7 +99,7 @@ bool update(const ConvexDispatch& dispatch, std::size_t i, const ShapeTraits& tr
     const unsigned convex = batch.kind(i) == PairKind::concave_convex ? traits.b : traits.a;
     return commit_concave(dispatch, i, (convex & kConvex) != 0, counts);
   }
-  if (update_sphere(batch, i, traits, counts)) return true;
+  if (update_without_algorithm(batch, i, traits, counts)) return true;
   if (!dispatch.runs_algorithms) return false;
   if (!is_clear_box(batch, i, traits)) run_algorithm(dispatch, i);
   ++counts->convex_pairs;
@@ -181,7 +180,7 @@ void commit_in_order(const ConvexDispatch& dispatch, std::size_t i, CommitCounts
   const bool sphere_first = a.getCollisionShape()->getShapeType() == SPHERE_SHAPE_PROXYTYPE;
   switch (batch.kind(i)) {
     case PairKind::convex:
-      if (update_sphere_box(batch.manifold(i), a, b, sphere_first)) {
+      if (update_convex(batch.manifold(i), a, b)) {
         ++counts->sphere_boxes;
         return;
       }

@@ -17,12 +17,12 @@ namespace bullet {
 
 /// Contribution of a commit to the statistics.
 struct CommitCounts {
-  std::uint64_t sphere_pairs = 0;   ///< pairs of two spheres
-  std::uint64_t touching = 0;       ///< sphere pairs that the collider reported as touching
-  std::uint64_t written = 0;        ///< sphere pairs updated without Bullet's algorithm
-  std::uint64_t sphere_boxes = 0;   ///< sphere-box pairs updated without Bullet's algorithm
-  std::uint64_t sphere_planes = 0;  ///< sphere-plane pairs updated without Bullet's algorithm
-  std::uint64_t convex_pairs = 0;   ///< other convex pairs, updated by Bullet's algorithms if close
+  std::uint64_t sphere_pairs = 0;     ///< pairs of two spheres
+  std::uint64_t touching = 0;         ///< sphere pairs that the collider reported as touching
+  std::uint64_t written = 0;          ///< sphere pairs updated without Bullet's algorithm
+  std::uint64_t sphere_boxes = 0;     ///< sphere-box pairs updated without Bullet's algorithm
+  std::uint64_t sphere_planes = 0;    ///< sphere-plane pairs updated without Bullet's algorithm
+  std::uint64_t convex_pairs = 0;     ///< other pairs of convex shapes, and of these and planes
   std::uint64_t sphere_concaves = 0;  ///< spheres on concave shapes, without Bullet's algorithm
   std::uint64_t concave_pairs = 0;    ///< other convex shapes on concave shapes
   std::uint64_t compound_pairs = 0;  ///< pairs with compounds, without Bullet's compound algorithms

@@ -8,6 +8,13 @@
 
 #include <LinearMath/btTransform.h>
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
+#include <bit>
+#include <cstdint>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
@@ -80,6 +87,173 @@ class BoxCore {
  private:
   TransposedProduct to_local_;
   btVector3 corners_[8];
+};
+
+/// The axis of a capsule.
+class CapsuleCore {
+ public:
+  CapsuleCore(const btTransform& pose, int up_axis, btScalar half_height)
+      : to_local_(pose.getBasis()) {
+    for (int end = 0; end < 2; ++end) {
+      ends_[end] = btVector3(0, 0, 0);
+      ends_[end][up_axis] = end == 0 ? half_height : -half_height;
+      placed_[end] = pose(ends_[end]);
+    }
+    neither_ = pose(btVector3(0, 0, 0));
+  }
+  btVector3 support(const btVector3& direction) const {
+    const FourScalars local = to_local_(direction);
+    btVector3 vec(local[0], local[1], local[2]);
+    const btScalar length2 = vec.length2();
+    if (length2 < SIMD_EPSILON * SIMD_EPSILON) {
+      vec.setValue(1, 0, 0);
+    } else {
+      vec *= btScalar(1) / btSqrt(length2);
+    }
+    const btScalar top = vec.dot(ends_[0]), bottom = vec.dot(ends_[1]);
+    if (bottom > (top > -BT_LARGE_FLOAT ? top : -BT_LARGE_FLOAT)) return placed_[1];
+    return top > -BT_LARGE_FLOAT ? placed_[0] : neither_;
+  }
+
+ private:
+  TransposedProduct to_local_;
+  btVector3 ends_[2], placed_[2], neither_;
+};
+
+class CylinderCore {
+ public:
+  /// @param half half extents, margin excluded
+  CylinderCore(const btTransform& pose, int up_axis, const btVector3& half)
+      : to_local_(pose.getBasis()),
+        pose_(pose),
+        up_(up_axis),
+        x_(up_axis == 0 ? 1 : 0),
+        z_(up_axis == 2 ? 1 : 2),
+        radius_(half[x_]),
+        half_height_(half[up_axis]) {}
+  btVector3 support(const btVector3& direction) const {
+    const FourScalars local = to_local_(direction);
+    const btVector3 v(local[0], local[1], local[2]);
+    const btScalar s = btSqrt(v[x_] * v[x_] + v[z_] * v[z_]);
+    btVector3 point;
+    if (s != btScalar(0)) {
+      const btScalar d = radius_ / s;
+      point[x_] = v[x_] * d;
+      point[z_] = v[z_] * d;
+    } else {
+      point[x_] = radius_;
+      point[z_] = 0;
+    }
+    point[up_] = v[up_] < btScalar(0) ? -half_height_ : half_height_;
+    return pose_(point);
+  }
+
+ private:
+  TransposedProduct to_local_;
+  btTransform pose_;
+  int up_, x_, z_;
+  btScalar radius_, half_height_;
+};
+
+/// The points of a hull, by coordinate.
+class HullPoints {
+ public:
+  /// Returns false if there are too many or no points.
+  bool load(const btVector3* points, int count) {
+    if (count < 1 || count > kMost) return false;
+    vectors_ = (count + 2 * kLanes - 1) / (2 * kLanes) * 2;
+    for (int i = 0; i < vectors_ * kLanes; ++i) {
+      const btVector3& point = points[i < count ? i : 0];
+      x_[i / kLanes][i % kLanes] = point.x();
+      y_[i / kLanes][i % kLanes] = point.y();
+      z_[i / kLanes][i % kLanes] = point.z();
+    }
+    return true;
+  }
+  /// The index of btVector3::maxDot(): of the first point with the largest dot product.
+  int furthest(const btVector3& direction) {
+    const Vector least = Vector{} - SIMD_INFINITY;
+    Vector even = least, odd = least;  // two chains of dependent operations
+    const auto dots_of = [&](int i) {
+      dots_[i] = x_[i] * direction.x() + y_[i] * direction.y() + z_[i] * direction.z();
+      return dots_[i];
+    };
+    for (int i = 0; i < vectors_; i += 2) {
+      even = larger(dots_of(i), even);
+      odd = larger(dots_of(i + 1), odd);
+    }
+    even = larger(odd, even);
+    btScalar largest = -SIMD_INFINITY;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (even[lane] > largest) largest = even[lane];
+    }
+    if (!(largest > -SIMD_INFINITY)) return 0;
+    return first_equal(largest);
+  }
+
+ private:
+  using Vector = FourScalars::Vector;
+  static constexpr int kLanes = FourScalars::kPerVector;
+  static constexpr int kMost = 128;
+
+  /// `b` if a lane is not a number.
+  static Vector larger(const Vector& a, const Vector& b) { return a > b ? a : b; }
+  /// The index of the first dot product with a value that one of them has. Without branches, whose
+  /// direction cannot be predicted.
+  int first_equal(btScalar value) const {
+    constexpr int kPerWord = 64 / kLanes;
+    for (int begin = 0;; begin += kPerWord) {
+      std::uint64_t equal = 0;
+      for (int i = begin; i < vectors_ && i < begin + kPerWord; ++i) {
+        equal |= std::uint64_t{lanes_equal(dots_[i], value)} << ((i - begin) * kLanes);
+      }
+      if (equal != 0) return begin * kLanes + std::countr_zero(equal);
+    }
+  }
+  /// A bit for each lane.
+  static unsigned lanes_equal(const Vector& v, btScalar value) {
+    const Vector values = Vector{} + value;
+#if defined(__SSE2__)
+    if constexpr (sizeof(btScalar) == 4) {
+      return static_cast<unsigned>(_mm_movemask_ps(reinterpret_cast<__m128>(v == values)));
+    } else {
+      return static_cast<unsigned>(_mm_movemask_pd(reinterpret_cast<__m128d>(v == values)));
+    }
+#else
+    const auto equal = v == values;
+    unsigned bits = 0;
+    for (int lane = 0; lane < kLanes; ++lane) bits |= equal[lane] != 0 ? 1u << lane : 0u;
+    return bits;
+#endif
+  }
+
+  Vector x_[kMost / kLanes], y_[kMost / kLanes], z_[kMost / kLanes];
+  Vector dots_[kMost / kLanes];  // not on the stack, which may be small
+  int vectors_ = 0;              ///< even
+};
+
+class HullCore {
+ public:
+  /// @param points,scaling of the shape  @param by_coordinate the same points
+  HullCore(const btTransform& pose, const btVector3* points, const btVector3& scaling,
+           HullPoints* by_coordinate)
+      : to_local_(pose.getBasis()),
+        pose_(pose),
+        points_(points),
+        scaling_(scaling),
+        by_coordinate_(by_coordinate) {}
+  btVector3 support(const btVector3& direction) const {
+    const FourScalars local = to_local_(direction);
+    const int i = by_coordinate_->furthest(btVector3(local[0], local[1], local[2]) * scaling_);
+    return pose_(points_[i] * scaling_);
+  }
+
+ private:
+  TransposedProduct to_local_;
+  btTransform pose_;
+  const btVector3* points_;
+  btVector3 scaling_;
+  HullPoints* by_coordinate_;
 };
 
 class TriangleCore {
