@@ -51,18 +51,18 @@ constexpr Pin kSoftStepPins[] = {
     {"overlap", 32, 60, 0x1aa5330e3d17bbf6u, 0xe54219b9024930d0u},
     {"lattice", 125, 30, 0xc1b4bc0d5892cdceu, 0xfdde9b1863a93df8u},
     {"polydisperse", 100, 60, 0xd62f77d75c6f7d7eu, 0x367a150899394731u},
-    {"mixed", 40, 150, 0x44bce6247c6a74b0u, 0x4c3b9d25bd6d8db2u},
-    {"capsules", 20, 200, 0x8fc3c063c6866444u, 0x392286b3f0abdca3u},
-    {"terrain", 20, 200, 0x98d0dcd581582243u, 0x675eb18da48ac4d5u},
-    {"ragdolls", 9, 200, 0x3577acf3641dc585u, 0xebfd1a2438a01396u},
-    {"bridge", 30, 200, 0xc76539dde485896bu, 0xd745c03722752c49u},
+    {"mixed", 40, 150, 0x55ba1c236c913c6eu, 0x1684125c518b8420u},
+    {"capsules", 20, 200, 0xb07904e024b50ff0u, 0x8e69fe3107a6f3deu},
+    {"terrain", 20, 200, 0x446c601086c8cea6u, 0x1e8985a54049248cu},
+    {"ragdolls", 9, 200, 0x1b7e1d26872c648eu, 0xc16fe4d19232b1beu},
+    {"bridge", 30, 200, 0x145a9237a03b6ac3u, 0x7ccb54ad6d246953u},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
     {"columns", 20000, 3, 0xf1dc6c610329eee1u, 0x8cfcea0c434ee1fdu},
 };
 
 /// joint_scene() with Solver::soft_step.
-constexpr Pin kJointPin{"joints", 100, 200, 0xfa3a2be555fb60a3u, 0x3421ae2d03cce991u};
+constexpr Pin kJointPin{"joints", 100, 200, 0xe1a8a93c73c64877u, 0xb0b3248aa9201b2cu};
 
 struct DemoPin {
   const char* demo;

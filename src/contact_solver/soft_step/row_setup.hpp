@@ -341,7 +341,8 @@ struct RowSetup {
       contacts.rolling_impulses[contact] = row.rolling_impulse * side;
     }
     // The points share the friction. Their sum is that of the row, and so is their torque about the
-    // normal if the points are in a plane with this normal.
+    // normal if the points are in a plane with this normal. Points that nearly coincide have no
+    // torque: their arms are rounding errors.
     const FrictionPoints from(*this, row, contact);
     Vec3 centre;
     for (std::uint32_t i = 0; i < row.count; ++i) centre += from.arms(i).a * from.share(i);
@@ -349,7 +350,8 @@ struct RowSetup {
     for (std::uint32_t i = 0; i < row.count; ++i) {
       spread += length_squared(from.arms(i).a - centre) * from.share(i);
     }
-    const Real twist = spread > 0 ? row.twist_impulse / spread : Real(0);
+    const bool has_spread = spread > kEpsilon * length_squared(centre);
+    const Real twist = has_spread ? row.twist_impulse / spread : Real(0);
     const Vec3 friction = row.tangent * row.friction_x + row.bitangent * row.friction_y;
     KeptImpulse* const kept = contacts.impulses + contacts.first_impulse(contact);
     for (std::uint32_t i = 0; i < row.count; ++i) {
