@@ -130,6 +130,13 @@ int main() {
   std::printf("the crate is %s, %.0f mm deep in the floor\n",
               world.awake(crate) ? "awake" : "asleep", static_cast<double>(-deepest) * 1000);
 
+  Real weight = 0;  // [N], on the floor
+  for (const jfpx::ContactForce& force : world.contact_forces()) {
+    if (force.a == floor) weight -= force.force.y;
+    if (force.b == floor) weight += force.force.y;
+  }
+  std::printf("the floor carries %.0f kg\n", static_cast<double>(weight) / 9.81);
+
   const auto swing = [&world, lamp] {
     world.apply_force(lamp, {2000, 0, 0});
     for (int n = 0; n < 60; ++n) world.step();

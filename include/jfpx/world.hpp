@@ -83,6 +83,19 @@ struct ContactEvent {
   friend bool operator==(const ContactEvent&, const ContactEvent&) = default;
 };
 
+/// Force of a contact point: the mean force over the last substep of a step.
+struct ContactForce {
+  BodyId a, b;
+  Vec3 normal;        ///< [-], unit, from b to a
+  Vec3 arm_a, arm_b;  ///< [m], world axes: from the centres of mass to the point
+  /// [N], world axes, on a at the point, of normal force and friction; b has the opposite force
+  Vec3 force;
+  /// [N m], world axes, on a in addition to that of the force: the point's share in the torque of
+  /// rolling and spinning friction; b has the opposite torque
+  Vec3 torque;
+  friend bool operator==(const ContactForce&, const ContactForce&) = default;
+};
+
 /// Result of one step. Times are wall-clock times.
 struct StepReport {
   std::uint64_t step = 0;                 ///< number of completed steps, without undone ones
@@ -369,6 +382,14 @@ class JFPX_API World {
   /// computes the list.
   /// @throws std::bad_alloc
   std::span<const ContactEvent> contact_events() const;
+  /// Forces of the contact points that push the bodies apart at the end of the last step, including
+  /// those of contact generators: first between two spheres, then all others, both sorted by
+  /// (a.index, b.index). Impacts are not included: a point that pushed in the step but not in its
+  /// last substep has no force. Sleeping bodies keep their forces. Empty with Solver::worst_first,
+  /// after restore() until the next step, and whenever contacts() is. Valid like contacts(). The
+  /// first call after a step makes the list.
+  /// @throws std::bad_alloc, DeviceError
+  std::span<const ContactForce> contact_forces() const;
   /// state_hash() of states().
   std::uint64_t state_hash() const;
   /// Name and settings of the world, as a Scene without bodies, joints and ignored pairs; restore()

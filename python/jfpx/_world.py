@@ -116,6 +116,33 @@ class WorldContacts(NamedTuple):
     sensor: np.ndarray
 
 
+class ContactForces(NamedTuple):
+    """Forces of E contact points: their mean over the last substep of a step, in the dtype of the
+    world. A point that pushed in the step but not in its last substep, as in a rebound, has none.
+
+    Attributes
+    ----------
+    pairs : array (2, E) of int64
+        BodyId.index of a and b, as in WorldContacts.
+    normal : array (E, 3)
+        Unit vectors from b to a.
+    arm_a, arm_b : array (E, 3)
+        [m], in the axes of the world: from the centres of mass of a and b to the point.
+    force : array (E, 3)
+        [N], in the axes of the world: on a at the point, of normal force and friction; b has the
+        opposite force.
+    torque : array (E, 3)
+        [N m]: on a in addition to that of the force, of rolling and spinning friction.
+    """
+
+    pairs: np.ndarray
+    normal: np.ndarray
+    arm_a: np.ndarray
+    arm_b: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+
+
 BEGIN, STAY, END = 0, 1, 2
 """Values of ContactEvents.phase."""
 
@@ -839,6 +866,17 @@ class World:
                                np.empty(size, np.int64), self._rows(size), self._rows(size),
                                self._values(size))
         self._core.write_events(*result)
+        return result
+
+    def contact_forces(self) -> ContactForces:
+        """Forces of the contact points that push at the end of the last step, as new arrays; they
+        include those of sleeping bodies. There are none when contacts() has none, after restore()
+        until the next step, and with the solver worst_first. The first call after a step makes the list. Raises OutOfMemory,
+        DeviceError."""
+        size = self._core.force_count()
+        result = ContactForces(np.empty((2, size), np.int64), self._rows(size), self._rows(size),
+                               self._rows(size), self._rows(size), self._rows(size))
+        self._core.write_forces(*result)
         return result
 
     def cast_ray(self, origin: Vector, direction: Vector, max_distance: float = math.inf, *,

@@ -32,6 +32,23 @@ void write_contacts(const PythonWorld& self, const Rows<std::int64_t>& pairs,
   }
 }
 
+void write_forces(const PythonWorld& self, const Rows<std::int64_t>& pairs,
+                  const Rows<Real>& normals, const Rows<Real>& arms_a, const Rows<Real>& arms_b,
+                  const Rows<Real>& forces, const Rows<Real>& torques) {
+  const std::span<const ContactForce> all = self.get().contact_forces();
+  if (normals.shape(0) != all.size()) throw ConcurrentUse(UseGuard::message("world"));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ContactForce& f = all[i];
+    pairs(0, i) = f.a.index;
+    pairs(1, i) = f.b.index;
+    set_row(normals, i, f.normal);
+    set_row(arms_a, i, f.arm_a);
+    set_row(arms_b, i, f.arm_b);
+    set_row(forces, i, f.force);
+    set_row(torques, i, f.torque);
+  }
+}
+
 void write_events(const PythonWorld& self, const Vector<std::int64_t>& phases,
                   const Rows<std::int64_t>& pairs, const Vector<std::int64_t>& counts,
                   const Rows<Real>& normals, const Rows<Real>& points,
@@ -105,6 +122,9 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
       .def("event_count",
            [](const PythonWorld& self) { return self.get().contact_events().size(); })
       .def("write_events", &write_events)
+      .def("force_count",
+           [](const PythonWorld& self) { return self.get().contact_forces().size(); })
+      .def("write_forces", &write_forces)
       .def("cast_rays", &cast_rays)
       .def(
           "cast_ray",

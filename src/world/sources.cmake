@@ -7,6 +7,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_finder.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_forces.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contacts_by_body.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/fixed_trees.cpp

@@ -122,6 +122,7 @@ struct World::Impl {
   /// @throws std::bad_alloc, DeviceError
   JFPX_API const ContactList& contact_list();
   const ContactList& contact_list_before();
+  const std::vector<ContactForce>& contact_forces();
   /// Builds the contact lists of the last two steps. Called before a change of bodies, or a move of
   /// the state to or from the device, that would change their data.
   void make_contact_lists();

@@ -3,6 +3,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/base/stopwatch.hpp"
+#include "src/world/contacts/contact_forces.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <mutex>
@@ -215,6 +216,14 @@ const ContactList& World::Impl::contact_list() {
 const ContactList& World::Impl::contact_list_before() {
   if (contacts.state == StepContacts::State::repeated) return contact_list();
   return contacts.before.get([this](ContactList* list) { make_list(true, list); });
+}
+
+const std::vector<ContactForce>& World::Impl::contact_forces() {
+  return contacts.forces.get([this](std::vector<ContactForce>* list) {
+    if (resident()) fetch_contact_set();
+    make_contact_forces(soft_step.last_contacts().view(), soft_step.inverse_h(), store, pool.get(),
+                        list);
+  });
 }
 
 void World::Impl::make_contact_lists() {

@@ -77,6 +77,7 @@ void World::Impl::read(BinaryReader* reader) {
   contacts.last.invalidate();
   contacts.last.get([&list](ContactList* restored) { *restored = std::move(list); });
   contacts.by_body.invalidate();
+  contacts.has_forces = false;
   contacts.shows_list = shown;
   contacts.shows_events = false;
   new_forces.commit(&forces);

@@ -212,6 +212,12 @@ std::span<const ContactEvent> World::contact_events() const {
                                         std::span(now.contacts).first(now.detected));
 }
 
+std::span<const ContactForce> World::contact_forces() const {
+  impl_->finish();
+  if (!impl_->contacts.shows_list || !impl_->contacts.has_forces) return {};
+  return impl_->contact_forces();
+}
+
 std::uint64_t World::state_hash() const { return jfpx::state_hash(states()); }
 
 const Scene& World::settings() const { return impl_->scene; }

@@ -141,6 +141,7 @@ class Twins {
     require(first_.state_hash() == second_.state_hash(), "equal bits");
     require(std::ranges::equal(first_.contacts(), second_.contacts()), "equal contacts");
     require(std::ranges::equal(first_.contact_events(), second_.contact_events()), "equal events");
+    require(std::ranges::equal(first_.contact_forces(), second_.contact_forces()), "equal forces");
     for (const BodyId id : first_.bodies()) {
       require(properties(first_, id) == properties(second_, id), "equal properties");
       const BodyState state = first_.state(id);

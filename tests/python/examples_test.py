@@ -24,6 +24,7 @@ def run(name, *arguments):
 
 
 @pytest.mark.parametrize("name, arguments, text", [
+    ("force_chains.py", ["--grains", "120", "--steps", "500"], "carry 1.000 of the weight"),
     ("neighbours.py", [], "all numbers of threads give the same bits"),
     ("pile.py", ["--spheres", "200", "--steps", "60"], "one thread of the CPU gives the same bits"),
     ("replay.py", [], "240 steps were repeated bit by bit\na change of 1 um/s is seen in step 1;"),

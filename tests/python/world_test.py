@@ -237,6 +237,23 @@ def test_contacts_have_indices_of_bodies_also_after_a_removal():
     assert sorted(world.contact_events().pairs[:, 0]) == [1, 2]
 
 
+def test_contact_forces_carry_the_weight():
+    scene = {"bodies": [{**FREE, "acceleration": [0, -9.81, 0], "mass": 3, "friction": 0.5, "position": [0.3, 0.5, 0]},
+                        {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0}]}
+    world = jfpx.World(scene)
+    assert len(world.contact_forces().force) == 0
+    world.run(120)
+    forces = world.contact_forces()
+    np.testing.assert_array_equal(forces.pairs, [[0], [1]])
+    np.testing.assert_allclose(forces.force, [[0, 3 * 9.81, 0]], atol=1e-3)
+    np.testing.assert_allclose(forces.arm_a, [[0, -0.5, 0]], atol=1e-2)
+    np.testing.assert_array_equal(forces.normal, [[0, 1, 0]])
+    np.testing.assert_array_equal(forces.torque, [[0, 0, 0]])
+    world.remove(world.bodies[0])
+    with pytest.raises(jfpx.ConcurrentUse):
+        world._core.write_forces(*forces)
+
+
 def test_filters_decide_which_bodies_touch():
     world = jfpx.World({"bodies": [FREE, {**FREE, "position": [0, 2.9, 0]}]})
     a, b = world.bodies

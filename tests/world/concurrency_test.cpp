@@ -27,6 +27,7 @@ struct Results {
   std::vector<RayHit> hits;
   std::vector<BodyId> touched;
   std::vector<Contact> contacts;
+  std::vector<ContactForce> forces;
   std::size_t events = 0, awake = 0;
   Snapshot snapshot;
   friend bool operator==(const Results&, const Results&) = default;
@@ -38,6 +39,7 @@ Results query(const World& world) {
   results.hits = world.cast_ray_through({.origin = {-9, 0, 0}, .direction = {1, 0, 0}});
   results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
   results.contacts.assign(world.contacts().begin(), world.contacts().end());
+  results.forces.assign(world.contact_forces().begin(), world.contact_forces().end());
   results.events = world.contact_events().size();
   results.snapshot = world.snapshot();
   for (const BodyId id : world.bodies()) results.awake += world.awake(id) ? 1 : 0;

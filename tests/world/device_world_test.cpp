@@ -32,6 +32,7 @@ namespace {
 
 using test::expect_equal;
 using test::expect_equal_contacts;
+using test::expect_equal_forces;
 using test::operator""_r;
 
 using MakeDevice = std::function<std::unique_ptr<DeviceWorld>(const Scene&)>;
@@ -127,6 +128,9 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
       ASSERT_NO_FATAL_FAILURE(step_both(&host, &device)) << "scene " << k << ", step " << n;
       if (n % 3 != 0) continue;
       ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device));
+      if (n % 9 == 0) {
+        ASSERT_NO_FATAL_FAILURE(expect_equal_forces(host, device));
+      }
     }
     EXPECT_TRUE(WorldAccess::impl(device).resident());
   }

@@ -33,6 +33,12 @@ inline void expect_equal_contacts(const World& host, const World& device) {
   ASSERT_EQ(std::vector(c.begin(), c.end()), std::vector(d.begin(), d.end()));
 }
 
+/// Copies the contacts of the solver from a device, so that later steps have them on the host.
+inline void expect_equal_forces(const World& host, const World& device) {
+  const auto a = host.contact_forces(), b = device.contact_forces();
+  ASSERT_EQ(std::vector(a.begin(), a.end()), std::vector(b.begin(), b.end()));
+}
+
 }  // namespace test
 }  // namespace JFPX_ABI
 }  // namespace jfpx

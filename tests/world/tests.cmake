@@ -31,6 +31,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/buoyancy_test.cpp
   world/capsule_world_test.cpp
   world/contact_events_test.cpp
+  world/contact_forces_test.cpp
   world/contact_generator_test.cpp
   world/cylinder_world_test.cpp
   world/erratum_test.cpp

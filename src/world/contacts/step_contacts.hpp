@@ -8,6 +8,7 @@
 #include "src/world/contacts/detected_contacts.hpp"
 
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -26,14 +27,16 @@ struct StepContacts {
     state = State::kept;
     events.invalidate();
     by_body.invalidate();
+    forces.invalidate();
   }
   /// Stores the contacts of the last step as those of the step before.
   void begin_detection() noexcept {
     swap_steps();
     last.invalidate();
+    forces.invalidate();
     state = State::found;
   }
-  void complete_step() noexcept { shows_list = shows_events = true; }
+  void complete_step() noexcept { shows_list = shows_events = has_forces = true; }
   /// Completes a step in which no body was awake.
   void repeat_step() noexcept {
     if (state != State::repeated) events.invalidate();
@@ -52,12 +55,16 @@ struct StepContacts {
   Lazy<ContactList> last, before;
   DetectedContacts detected, detected_before;  ///< of the same steps, unless on a device
   ContactListMaker maker;
-  ContactsByBody by_body;  ///< of `last`
-  ContactEvents events;    ///< of both
+  ContactsByBody by_body;                  ///< of `last`
+  ContactEvents events;                    ///< of both
+  Lazy<std::vector<ContactForce>> forces;  ///< of the contacts of `last`
   State state = State::kept;
   /// Whether World::contacts() returns `last`: not after a body was added or removed.
   bool shows_list = false;
   bool shows_events = false;  ///< whether World::contact_events() compares both lists
+  /// Whether World::contact_forces() has those of the contacts: not after restore(), because a
+  /// snapshot has no arms.
+  bool has_forces = false;
 
  private:
   void swap_steps() noexcept {

@@ -37,6 +37,7 @@ class SoftStep {
   soft_step::ContactSet& last_contacts() { return cache_.last(); }
   /// Const overload. drop_removed() must have been called since the last forget().
   const soft_step::ContactSet& last_contacts() const { return cache_.last(); }
+  Real inverse_h() const { return constants_.inverse_h; }  ///< [1/s], of a substep
   /// Adds the contacts of contact generators.
   void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
   /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
