@@ -9,14 +9,12 @@
 #include "src/bullet/dispatch/body_wrapper.hpp"
 #include "src/bullet/dispatch/concave_triangles.hpp"
 #include "src/bullet/dispatch/core_distance.hpp"
-#include "src/bullet/dispatch/cores.hpp"
 #include "src/bullet/dispatch/separation_test.hpp"
 #include "src/bullet/dispatch/sphere_triangle.hpp"
+#include "src/bullet/dispatch/visit_core.hpp"
 #include "src/bullet/exact_class.hpp"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
-#include <BulletCollision/CollisionShapes/btBoxShape.h>
-#include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleShape.h>
@@ -26,6 +24,7 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 namespace jfpx {
@@ -56,32 +55,37 @@ class SphereSupport {
   btScalar radius_;
 };
 
-/// btGjkPairDetector for a box and the triangles of a concave shape.
-class BoxDetector {
+/// btGjkPairDetector for a convex shape and the triangles of a concave shape.
+class TriangleDetector {
  public:
-  BoxDetector(const btBoxShape& box, const btTransform& pose, const btTransform& triangle_pose,
-              btScalar triangle_margin, btScalar threshold)
+  TriangleDetector(const btConvexShape& shape, const btTransform& pose,
+                   const btTransform& triangle_pose, btScalar triangle_margin, btScalar threshold)
       : offset_((pose.getOrigin() + triangle_pose.getOrigin()) * btScalar(0.5)),
         triangle_pose_(moved(triangle_pose)),
         to_triangle_(triangle_pose.getBasis()),
         pose_(moved(pose)),
-        half_(box.getImplicitShapeDimensions()),
-        core_(pose_, half_),
-        input_{.margin_a = box.btBoxShape::getMargin(),
+        input_{.margin_a = shape.getMargin(),
                .margin_b = triangle_margin,
                .maximum_distance_squared = 0,
                .offset = offset_} {
+    if (shape.getShapeType() == BOX_SHAPE_PROXYTYPE) {
+      half_ = static_cast<const btBoxShape&>(shape).getImplicitShapeDimensions();
+    }
     const btScalar reach = input_.margin_a + input_.margin_b + threshold;
     input_.maximum_distance_squared = reach * reach;
   }
 
+  /// The pose of the shape's core.
+  const btTransform& pose() const { return pose_; }
+
   /// Returns false, without a change, if Bullet's algorithm must process the triangle.
-  bool add_contact(const btVector3* vertices, btManifoldResult* result) const {
+  template <class Core>
+  bool add_contact(const Core& core, const btVector3* vertices, btManifoldResult* result) const {
     const TriangleCore triangle(triangle_pose_, to_triangle_, vertices);
     DetectorInput input = input_;
-    input.are_clear = is_clear(triangle);
+    if constexpr (std::is_same_v<Core, BoxCore>) input.are_clear = is_clear(triangle);
     DetectorContact contact;
-    switch (find_closest_points(core_, triangle, input, &contact)) {
+    switch (find_closest_points(core, triangle, input, &contact)) {
       case DetectorResult::unknown:
         return false;
       case DetectorResult::apart:
@@ -100,7 +104,7 @@ class BoxDetector {
     return pose;
   }
 
-  /// Whether a plane parallel to the triangle is well between the triangle and the core of the box.
+  /// Whether a plane parallel to the triangle is well between the triangle and the core of a box.
   bool is_clear(const TriangleCore& triangle) const {
     const btVector3 &v0 = triangle.vertex(0), &v1 = triangle.vertex(1), &v2 = triangle.vertex(2);
     const btVector3 normal = (v1 - v0).cross(v2 - v0);
@@ -120,8 +124,7 @@ class BoxDetector {
   btTransform triangle_pose_;
   TransposedProduct to_triangle_;
   btTransform pose_;
-  btVector3 half_;
-  BoxCore core_;
+  btVector3 half_;  ///< half extents of a box, margin excluded
   DetectorInput input_;
 };
 
@@ -164,7 +167,9 @@ class ConcavePair {
     shape().getAabb(to_triangles, box.min, box.max);
     if (!widen(&box)) return ConcaveFallback::not_finite;
     begin();
-    is_plain_box(*function) ? update_box(*function, box) : update_convex(*function, box);
+    if (function->m_numPerturbationIterations != 0 || !update_by_core(*function, box)) {
+      update_by_algorithm(*function, box);
+    }
     result_.refreshContactPoints();
     ++counts->concave_pairs;
     return ConcaveFallback::none;
@@ -378,31 +383,38 @@ class ConcavePair {
                             pose * contact.point.point_on_triangle, contact.point.distance);
   }
 
-  /// Whether BoxDetector computes the contacts of the convex shape.
-  bool is_plain_box(const btConvexConvexAlgorithm::CreateFunc& function) const {
-    return function.m_numPerturbationIterations == 0 && is_exactly<btBoxShape>(shape());
+  /// Returns false, without a change, if there is no core for the shape.
+  [[gnu::noinline]] bool update_by_core(const btConvexConvexAlgorithm::CreateFunc& function,
+                                        const LocalBox& near) {
+    static thread_local HullPoints room;  // not on the stack, which may be small
+    const TriangleDetector detector(shape(), convex_.getWorldTransform(),
+                                    concave_.getWorldTransform(), triangle_margin(), threshold());
+    return visit_core(shape(), detector.pose(), &room, [&](const auto& core) {
+      const auto visit = [&](const btVector3* triangle, int part, int index) {
+        if (!detector.add_contact(core, triangle, &result_)) run(function, triangle, part, index);
+      };
+      if constexpr (std::is_same_v<std::decay_t<decltype(core)>, BoxCore>) {
+        const auto& box = static_cast<const btBoxShape&>(shape());
+        const btScalar margin = box.btBoxShape::getMargin();
+        const btVector3 half = box.getImplicitShapeDimensions() + btVector3(margin, margin, margin);
+        for_each_close_triangle(
+            near,
+            [&](const btVector3& direction) {
+              return btVector3(btFsels(direction.x(), half.x(), -half.x()),
+                               btFsels(direction.y(), half.y(), -half.y()),
+                               btFsels(direction.z(), half.z(), -half.z()));
+            },
+            visit);
+      } else {
+        for_each_close_triangle(
+            near,
+            [&](const btVector3& direction) { return shape().localGetSupportingVertex(direction); },
+            visit);
+      }
+    });
   }
-
-  [[gnu::noinline]] void update_box(const btConvexConvexAlgorithm::CreateFunc& function,
-                                    const LocalBox& near) {
-    const auto& box = static_cast<const btBoxShape&>(shape());
-    const btScalar margin = box.btBoxShape::getMargin();
-    const btVector3 half = box.getImplicitShapeDimensions() + btVector3(margin, margin, margin);
-    const BoxDetector detector(box, convex_.getWorldTransform(), concave_.getWorldTransform(),
-                               triangle_margin(), threshold());
-    for_each_close_triangle(
-        near,
-        [&](const btVector3& direction) {
-          return btVector3(btFsels(direction.x(), half.x(), -half.x()),
-                           btFsels(direction.y(), half.y(), -half.y()),
-                           btFsels(direction.z(), half.z(), -half.z()));
-        },
-        [&](const btVector3* triangle, int part, int index) {
-          if (!detector.add_contact(triangle, &result_)) run(function, triangle, part, index);
-        });
-  }
-  [[gnu::noinline]] void update_convex(const btConvexConvexAlgorithm::CreateFunc& function,
-                                       const LocalBox& near) {
+  [[gnu::noinline]] void update_by_algorithm(const btConvexConvexAlgorithm::CreateFunc& function,
+                                             const LocalBox& near) {
     for_each_close_triangle(
         near,
         [&](const btVector3& direction) { return shape().localGetSupportingVertex(direction); },

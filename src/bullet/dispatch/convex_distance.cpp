@@ -1,47 +1,12 @@
-/// Selects the cores of two convex shapes.
+/// Selects the detector for the cores of two shapes.
 #include "src/bullet/dispatch/convex_distance.hpp"
 
-#include "src/bullet/dispatch/cores.hpp"
-
-#include <BulletCollision/CollisionShapes/btBoxShape.h>
-#include <BulletCollision/CollisionShapes/btCapsuleShape.h>
-#include <BulletCollision/CollisionShapes/btConvexHullShape.h>
-#include <BulletCollision/CollisionShapes/btCylinderShape.h>
+#include "src/bullet/dispatch/visit_core.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 namespace {
-
-/// Calls f(core) for the core of a shape.
-/// @param room memory for the points of a hull
-/// @return that of f; `unknown` if there is no core for the shape
-template <class F>
-DetectorResult visit_core(const btConvexShape& shape, const btTransform& pose, HullPoints* room,
-                          const F& f) {
-  switch (shape.getShapeType()) {
-    case SPHERE_SHAPE_PROXYTYPE:
-      return f(CenterCore(pose));
-    case BOX_SHAPE_PROXYTYPE:
-      return f(BoxCore(pose, static_cast<const btBoxShape&>(shape).getImplicitShapeDimensions()));
-    case CAPSULE_SHAPE_PROXYTYPE: {
-      const auto& capsule = static_cast<const btCapsuleShape&>(shape);
-      return f(CapsuleCore(pose, capsule.getUpAxis(), capsule.getHalfHeight()));
-    }
-    case CYLINDER_SHAPE_PROXYTYPE: {
-      const auto& cylinder = static_cast<const btCylinderShape&>(shape);
-      return f(CylinderCore(pose, cylinder.getUpAxis(), cylinder.getImplicitShapeDimensions()));
-    }
-    case CONVEX_HULL_SHAPE_PROXYTYPE: {
-      const auto& hull = static_cast<const btConvexHullShape&>(shape);
-      const btVector3* const points = hull.getUnscaledPoints();
-      if (!room->load(points, hull.getNumPoints())) return DetectorResult::unknown;
-      return f(HullCore(pose, points, hull.getLocalScalingNV(), room));
-    }
-    default:
-      return DetectorResult::unknown;
-  }
-}
 
 /// Whether Bullet has a distance function of its own for both shapes.
 bool are_round(int a, int b) {
@@ -69,11 +34,13 @@ DetectorResult find_closest_points(const ConvexPairInput& input, DetectorContact
                          .offset = offset};
   const btScalar reach = detector.margin_a + detector.margin_b + input.threshold;
   detector.maximum_distance_squared = reach * reach;
-  return visit_core(shape_a, a, &room_a, [&](const auto& core_a) {
-    return visit_core(shape_b, b, &room_b, [&](const auto& core_b) {
-      return find_closest_points(core_a, core_b, detector, contact);
+  DetectorResult result = DetectorResult::unknown;
+  visit_core(shape_a, a, &room_a, [&](const auto& core_a) {
+    visit_core(shape_b, b, &room_b, [&](const auto& core_b) {
+      result = find_closest_points(core_a, core_b, detector, contact);
     });
   });
+  return result;
 }
 
 }  // namespace bullet
