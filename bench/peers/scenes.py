@@ -13,7 +13,7 @@ FRICTION = 0.5
 
 
 def hull_volume(points):
-    """Volume of the convex hull of a few points around the origin, by all triples of points."""
+    """Volume of the convex hull of a few points around the origin, no four in a plane, by all triples."""
     points = np.array(points)
     volume = 0.0
     for i, j, k in itertools.combinations(range(len(points)), 3):
@@ -67,7 +67,7 @@ def balls(n=16):
     bodies = open_box((-1, -1), (n * 1.05 + 0.2, n * 1.05 + 0.2), 40)
     for y, x, z in itertools.product(range(n), repeat=3):
         bodies.append(solid({"type": "sphere", "radius": 0.5},
-                            (x * 1.05 + 0.1 * rng.random(), 0.6 + y * 1.05, z * 1.05 + 0.1 * rng.random())))
+                            (x * 1.05 + 0.04 * rng.random(), 0.6 + y * 1.05, z * 1.05 + 0.04 * rng.random())))
     return scene(bodies)
 
 
