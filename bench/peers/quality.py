@@ -71,16 +71,20 @@ def measures(name, scene, states):
     return result
 
 
+def number(value):
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
+
 def words(m):
     """A cell of the table: deepest penetration, speed, and what is special."""
     if "speed" not in m:
         return f"{m['lost']} bodies lost"
-    cell = "" if m["deepest"] is None else f"{m['deepest']:.3g}; "
-    cell += f"{m['speed']:.2g}"
+    cells = [] if m["deepest"] is None else [number(m["deepest"])]
+    cells.append(number(m["speed"]))
     if "moved" in m:
-        cell += f"; {'stands, ' if m['moved'] < 500 else 'falls, '}{m['moved']:.2g}"
+        cells.append(number(m["moved"]) if m["moved"] < 500 else "falls")
     if "joints" in m:
-        cell += f"; {m['joints']:.2g}"
+        cells.append(number(m["joints"]))
     if m["lost"]:
-        cell += f"; {m['lost']} lost"
-    return cell
+        cells.append(f"{m['lost']} lost")
+    return "; ".join(cells)
