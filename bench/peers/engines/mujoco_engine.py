@@ -1,5 +1,5 @@
 """MuJoCo, through its package of PyPI. Joints are those of a tree, in reduced coordinates, and a mesh is a
-height field, because MuJoCo collides with the convex hull of a mesh. A pyramid explodes with one step of 1/60 s,
+height field, because MuJoCo collides with the convex hull of a mesh. A pyramid falls apart with one step of 1/60 s,
 and stands with four substeps. The figures are unstable without armature. A step of 4,096 balls in one heap takes
 minutes with the solver Newton, so that larger scenes have CG."""
 
