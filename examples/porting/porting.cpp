@@ -51,11 +51,9 @@ int main() {
   place_joint(&hinge, world.state(hinge.a), {}, {Real(-3.5), 1, 0}, jfpx::Vec3{0, 1, 0});
   const jfpx::JointId door = world.add_joint(hinge);
 
-  constexpr Real kLocked = Real(1e9);  // [kg m^2]
-  // A character is a capsule whose rotation is locked by a large inertia.
   jfpx::BodyDef walker = body(jfpx::Capsule{Real(0.4), Real(0.5)}, {0, Real(0.9), 6}, 80,
                               {.category = kPlayer, .mask = ~kDebris});
-  walker.inertia = jfpx::diagonal({kLocked, kLocked, kLocked});
+  walker.motion_locks = jfpx::kFixedRotation;  // a character does not fall over
   walker.friction = 0;
   walker.can_sleep = false;
   const jfpx::BodyId player = world.add(walker);

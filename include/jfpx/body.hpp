@@ -31,6 +31,21 @@ JFPX_HD constexpr bool may_collide(const CollisionFilter& a, const CollisionFilt
   return (a.category & b.mask) != 0 && (b.category & a.mask) != 0;
 }
 
+/// Axes of the world along which (linear) or about which (angular) a body does not move, as in
+/// Box2D. The body keeps its coordinates along locked axes, and its angular velocity about them is
+/// 0. See docs/world.md for how contacts and joints act on it.
+struct MotionLocks {
+  bool linear_x = false, linear_y = false, linear_z = false;
+  bool angular_x = false, angular_y = false, angular_z = false;
+  friend bool operator==(const MotionLocks&, const MotionLocks&) = default;
+};
+
+/// The body does not rotate, as the character of a game.
+inline constexpr MotionLocks kFixedRotation{
+    .angular_x = true, .angular_y = true, .angular_z = true};
+/// The body moves in a plane of constant z, as the bodies of a game in two dimensions.
+inline constexpr MotionLocks kPlanarMotion{.linear_z = true, .angular_x = true, .angular_y = true};
+
 /// Definition of a rigid body in a scene. SI units.
 struct BodyDef {
   Shape shape = Sphere{};
@@ -61,6 +76,9 @@ struct BodyDef {
   /// A sensor has contacts and contact events, but the contacts are not resolved and wake no body.
   /// Contacts of contact generators are resolved.
   bool sensor = false;
+  /// Axes along or about which the body does not move; velocities along or about them become 0.
+  /// Ignored for mass 0. Solver::soft_step only.
+  MotionLocks motion_locks;
   std::uint64_t user_data = 0;  ///< application data without effect
   friend bool operator==(const BodyDef&, const BodyDef&) = default;
 };

@@ -48,6 +48,7 @@ class JFPX_API RecordedWorld {
   void set_damping(BodyId id, Real linear, Real angular);
   void set_mass(BodyId id, Real mass);
   void set_inertia(BodyId id, const std::optional<Mat3>& inertia);
+  void set_motion_locks(BodyId id, const MotionLocks& locks);
   void set_user_data(BodyId id, std::uint64_t user_data);
   void set_filter(BodyId id, const CollisionFilter& filter);
   void set_pair_ignored(BodyId a, BodyId b, bool ignored);

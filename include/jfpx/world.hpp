@@ -191,7 +191,8 @@ class JFPX_API World {
   /// @throws InvalidArgument for an unknown id
   void wake(BodyId id);
   Real mass(BodyId id) const;  ///< [kg]; 0: immovable or kinematic
-  /// [1/(kg m^2)], world axes, about the centre of mass; zero for mass 0.
+  /// [1/(kg m^2)], world axes, about the centre of mass; zero for mass 0, and for axes about which
+  /// the rotation is locked.
   Mat3 inverse_inertia(BodyId id) const;
   /// [kg m^2], body axes, about the centre of mass; zero for mass 0.
   Mat3 inertia(BodyId id) const;
@@ -221,6 +222,11 @@ class JFPX_API World {
   /// [kg m^2], as BodyDef::inertia; absent: that of the solid shape. Has no effect on a body of
   /// mass 0.
   void set_inertia(BodyId id, const std::optional<Mat3>& inertia);
+  /// BodyDef::motion_locks. A change wakes the body, and velocities along or about the locked axes
+  /// become 0. Has no effect on a body of mass 0. @throws InvalidArgument also if the solver is
+  /// worst_first
+  MotionLocks motion_locks(BodyId id) const;
+  void set_motion_locks(BodyId id, const MotionLocks& locks);
   std::uint64_t user_data(BodyId id) const;
   void set_user_data(BodyId id, std::uint64_t user_data);
 

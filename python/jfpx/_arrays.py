@@ -263,6 +263,17 @@ def triple(value: Any, name: str, size: int = 3) -> tuple[float, ...]:
     return numbers
 
 
+def flags(value: Any, name: str, size: int = 3) -> list[bool]:
+    """`size` truth values."""
+    try:
+        values = list(value)
+    except TypeError:
+        raise InvalidArgument(f"{name} is {value!r}; it must be {size} truth values") from None
+    if len(values) != size or not all(isinstance(x, (bool, np.bool_)) for x in values):
+        raise InvalidArgument(f"{name} is {value!r}; it must be {size} truth values")
+    return [bool(x) for x in values]
+
+
 def number(value: Any, name: str) -> float:
     """A number that is not NaN."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")

@@ -705,6 +705,23 @@ class World:
         self._core.set_damping(_arrays.body(body), _arrays.number(linear, "linear"),
                                _arrays.number(angular, "angular"))
 
+    def motion_locks(self, body: BodyId) -> tuple[tuple[bool, bool, bool], tuple[bool, bool, bool]]:
+        """Returns the locked axes of a body, see set_motion_locks(): whether it does not move along
+        the axes x, y and z of the world, and whether it does not rotate about them. Raises
+        InvalidArgument for an unknown body."""
+        return self._core.motion_locks(_arrays.body(body))
+
+    def set_motion_locks(self, body: BodyId, linear: Sequence[bool] = (False, False, False),
+                         angular: Sequence[bool] = (False, False, False)) -> None:
+        """Locks axes of motion of a body: it moves neither along axes of `linear` nor about axes of
+        `angular`, each x, y and z of the world, and its velocities along and about them become 0. A
+        change wakes the body; has no effect on one of mass 0. A character that does not fall over
+        has ``angular=(True, True, True)``, a body of a game in two dimensions
+        ``linear=(False, False, True), angular=(True, True, False)``. Raises InvalidArgument for an
+        unknown body, and if the solver is worst_first."""
+        self._core.set_motion_locks(_arrays.body(body), _arrays.flags(linear, "linear"),
+                                    _arrays.flags(angular, "angular"))
+
     def sensor(self, body: BodyId) -> bool:
         """Whether a body is a sensor: it has contacts, but they are not resolved. Raises
         InvalidArgument for an unknown body."""

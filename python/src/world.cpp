@@ -169,6 +169,18 @@ void bind_properties(nb::class_<PythonWorld>& world) {
            })
       .def("set_damping", [](PythonWorld& self, IdTuple id, Real linear,
                              Real angular) { self.get().set_damping(to_id(id), linear, angular); })
+      .def("motion_locks",
+           [](const PythonWorld& self, IdTuple id) {
+             const MotionLocks locks = self.get().motion_locks(to_id(id));
+             return std::pair(std::tuple(locks.linear_x, locks.linear_y, locks.linear_z),
+                              std::tuple(locks.angular_x, locks.angular_y, locks.angular_z));
+           })
+      .def("set_motion_locks",
+           [](PythonWorld& self, IdTuple id, const std::array<bool, 3>& linear,
+              const std::array<bool, 3>& angular) {
+             self.get().set_motion_locks(
+                 to_id(id), {linear[0], linear[1], linear[2], angular[0], angular[1], angular[2]});
+           })
       .def("sensor",
            [](const PythonWorld& self, IdTuple id) { return self.get().sensor(to_id(id)); })
       .def("filter",

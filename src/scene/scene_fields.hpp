@@ -14,6 +14,17 @@ void each_field(Is<CollisionFilter> auto& filter, const auto& visit) {
   visit(field("mask"), mask);
 }
 
+/// Only the locked axes are in JSON.
+void each_field(Is<MotionLocks> auto& locks, const auto& visit) {
+  auto& [linear_x, linear_y, linear_z, angular_x, angular_y, angular_z] = locks;
+  visit(newer_field("linear_x"), linear_x);
+  visit(newer_field("linear_y"), linear_y);
+  visit(newer_field("linear_z"), linear_z);
+  visit(newer_field("angular_x"), angular_x);
+  visit(newer_field("angular_y"), angular_y);
+  visit(newer_field("angular_z"), angular_z);
+}
+
 void each_field(Is<BodyState> auto& state, const auto& visit) {
   auto& [position, orientation, velocity, angular_velocity] = state;
   visit(field("position", kInWorld), position);
@@ -25,7 +36,7 @@ void each_field(Is<BodyState> auto& state, const auto& visit) {
 void each_field(Is<BodyDef> auto& body, const auto& visit) {
   auto& [shape, mass, kinematic, inertia, position, orientation, velocity, angular_velocity,
          acceleration, linear_damping, angular_damping, friction, restitution, rolling_friction,
-         spinning_friction, can_sleep, filter, sensor, user_data] = body;
+         spinning_friction, can_sleep, filter, sensor, motion_locks, user_data] = body;
   visit(required_field("shape"), shape);
   visit(field("mass", kNotNegative), mass);
   visit(field("kinematic"), kinematic);
@@ -44,6 +55,7 @@ void each_field(Is<BodyDef> auto& body, const auto& visit) {
   visit(newer_field("rolling_friction", kNotNegative), rolling_friction);
   visit(newer_field("spinning_friction", kNotNegative), spinning_friction);
   visit(newer_field("sensor"), sensor);
+  visit(newer_field("motion_locks"), motion_locks);
   visit(newer_field("user_data"), user_data);
 }
 

@@ -215,9 +215,15 @@ std::string find_inertia_fault(const Shape& shape, Real mass) {
   return std::visit([mass](const auto& s) { return find_solid_fault(s, mass); }, shape);
 }
 
-void validate_body(const BodyDef& def, std::uint64_t body) {
+std::string find_locks_fault(const MotionLocks& locks, Solver solver) {
+  if (locks == MotionLocks{} || solver == Solver::soft_step) return {};
+  return "solver is worst_first; it must be soft_step for a body with motion_locks";
+}
+
+void validate_body(const BodyDef& def, std::uint64_t body, Solver solver) {
   std::string found = find_range_fault(def);
   if (found.empty()) found = find_coupled_fault(def);
+  if (found.empty()) found = find_locks_fault(def.motion_locks, solver);
   if (!found.empty()) throw InvalidScene("body " + std::to_string(body) + ": " + found);
 }
 
@@ -232,7 +238,9 @@ void validate(const Scene& scene) {
   std::string found = find_field_fault(scene);
   if (!found.empty()) throw InvalidScene("scene: " + found);
   validate_body_count(scene.bodies.size());
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) validate_body(scene.bodies[i], i);
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    validate_body(scene.bodies[i], i, scene.solver);
+  }
   found = find_pair_fault(scene.ignored_pairs, scene.bodies.size());
   if (found.empty()) found = find_joint_fault(scene);
   if (!found.empty()) throw InvalidScene("scene: " + found);

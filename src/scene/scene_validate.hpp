@@ -11,9 +11,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 /// Checks all fields of a body.
-/// @param body index of the body in the scene (or in World::bodies()), for the message
+/// @param body   index of the body in the scene (or in World::bodies()), for the message
+/// @param solver of the scene
 /// @throws InvalidScene
-void validate_body(const BodyDef& def, std::uint64_t body);
+void validate_body(const BodyDef& def, std::uint64_t body, Solver solver);
 /// @throws InvalidScene if the number of bodies exceeds the range of SphereIndex
 void validate_body_count(std::uint64_t bodies);
 /// Checks that the coordinates are within kMaxCoordinate, the velocities are finite and the
@@ -36,6 +37,8 @@ JFPX_API std::string find_mass_fault(Real mass);
 std::string find_inertia_fault(const Mat3& inertia);
 /// Checks the inertia of a solid body with a valid shape that may be movable.
 std::string find_inertia_fault(const Shape& shape, Real mass);
+/// Checks that the solver knows the locks. Result as above.
+std::string find_locks_fault(const MotionLocks& locks, Solver solver);
 /// The shortest text that converts back to the same value.
 JFPX_API std::string to_text(Real value);
 JFPX_API std::string to_text(const Vec3& v);

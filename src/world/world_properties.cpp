@@ -45,6 +45,23 @@ void World::set_inertia(BodyId id, const std::optional<Mat3>& inertia) {
   bodies.wake(body);
 }
 
+MotionLocks World::motion_locks(BodyId id) const {
+  return impl_->store.motion_locks(impl_->store.require(id));
+}
+
+void World::set_motion_locks(BodyId id, const MotionLocks& locks) {
+  BodyStore& bodies = impl_->store;
+  const std::uint32_t body = bodies.require(id);
+  require_valid(find_locks_fault(locks, impl_->scene.solver));
+  if (!bodies.movable(body) || bodies.motion_locks(body) == locks) return;
+  const BodyState state = impl_->bodies_with_states().state(body);
+  impl_->edited_body(body, {.sets_state = true, .sets_mass = true, .wakes = true})
+      .set_motion_locks(body, locks);
+  bodies.refresh_inertia(body);
+  bodies.set_velocities(body, state);
+  impl_->note_change();
+}
+
 Real World::friction(BodyId id) const { return impl_->store.friction(impl_->store.require(id)); }
 
 void World::set_friction(BodyId id, Real friction) {

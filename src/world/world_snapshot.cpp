@@ -26,9 +26,11 @@ void World::Impl::write(BinaryWriter* writer) {
   if (parts >= SnapshotParts::joints) write_joints(writer, joints);
   if (parts >= SnapshotParts::joints_and_places) store.write_places(writer);
   if (parts >= SnapshotParts::recyclable) write_tests(writer, soft_step.last_contacts());
+  if (parts >= SnapshotParts::locks) store.write_locks(writer);
 }
 
 SnapshotParts World::Impl::snapshot_parts() const {
+  if (store.any_locks()) return SnapshotParts::locks;
   if (joints.any_frames()) return SnapshotParts::frames;
   if (any_recyclable(soft_step.last_contacts())) return SnapshotParts::recyclable;
   if (store.has_blocks() || store.has_places()) return SnapshotParts::joints_and_places;
@@ -56,9 +58,12 @@ void World::Impl::read(BinaryReader* reader) {
   if (reader->left() > 0) new_joints = read_joints(reader, &colors, &bodies);
   if (reader->left() > 0) bodies.read_places(reader);
   if (reader->left() > 0) read_tests(reader, &last);
+  if (reader->left() > 0) bodies.read_locks(reader);
   BinaryReader::require(reader->left() == 0, "it is too long");
   BinaryReader::require(new_joints.empty() || settings.solver == Solver::soft_step,
                         "it has joints, and the solver worst_first");
+  BinaryReader::require(!bodies.any_locks() || settings.solver == Solver::soft_step,
+                        "it has motion locks, and the solver worst_first");
 
   auto new_worst_first = make_worst_first_step(settings);
   soft_step.reserve(bodies.capacity());

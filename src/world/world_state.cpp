@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 BodyId World::add(const BodyDef& body) {
   const std::uint64_t number = impl_->store.size();
   validate_body_count(number + 1);
-  validate_body(body, number);
+  validate_body(body, number, impl_->scene.solver);
   const BodyId id = impl_->add(body);
   impl_->note_change();
   impl_->contacts.shows_list = false;

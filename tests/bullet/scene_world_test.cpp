@@ -459,6 +459,43 @@ TEST(SceneWorld, SensorsHaveContactPointsWithoutResponse) {
   EXPECT_GT(touched, 5u);
 }
 
+TEST(SceneWorld, LocksAreTheFactorsOfBulletAndMoveAsStock) {
+  Scene scene;
+  for (int i = 0; i < 12; ++i) {
+    BodyDef def = ball({Real(0.3) * static_cast<Real>(i % 3), static_cast<Real>(i) + 1, 0});
+    if (i % 2 == 0) def.shape = Box{{Real(0.5), Real(0.4), Real(0.3)}};
+    def.motion_locks = i % 3 == 0 ? kFixedRotation : kPlanarMotion;
+    def.velocity = {0, 0, 1};
+    def.angular_velocity = {1, 2, 3};
+    scene.bodies.push_back(def);
+  }
+  BodyDef ground;
+  ground.shape = HalfSpace{};
+  ground.mass = 0;
+  scene.bodies.push_back(ground);
+  SceneWorld stock(scene, {.dispatcher = DispatcherKind::stock,
+                           .solver = SolverKind::stock,
+                           .world = WorldKind::stock});
+  SceneWorld ours(scene, {.dispatch = {.minimum_batch = 0}});
+  for (int n = 0; n < 120; ++n) {
+    stock.step();
+    ours.step();
+    ASSERT_EQ(ours.states(), stock.states()) << n;
+  }
+  for (std::size_t i = 0; i < 12; ++i) {
+    const BodyState state = ours.states()[i];
+    const bool is_planar = scene.bodies[i].motion_locks == kPlanarMotion;
+    EXPECT_EQ(state.angular_velocity.x, 0);
+    EXPECT_EQ(state.angular_velocity.y, 0);
+    if (is_planar) {
+      EXPECT_EQ(state.position.z, 0);
+    } else {
+      EXPECT_EQ(state.angular_velocity.z, 0);
+      EXPECT_GT(state.position.z, 0);
+    }
+  }
+}
+
 TEST(SceneWorld, WithFiltersMovesAsStock) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));

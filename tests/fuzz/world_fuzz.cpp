@@ -21,6 +21,7 @@ using fuzz::draw_contact;
 using fuzz::draw_filter;
 using fuzz::draw_id;
 using fuzz::draw_joint;
+using fuzz::draw_locks;
 using fuzz::draw_state;
 using fuzz::require;
 using test::Bytes;
@@ -235,12 +236,13 @@ void change_joints(Bytes& bytes, Twins& twins) {
 
 void change_properties(Bytes& bytes, Twins& twins) {
   const BodyId id = draw_id(bytes, twins.world().bodies());
-  switch (bytes.below(9)) {
+  switch (bytes.below(10)) {
     case 0: {
       if (twins.world().bodies().size() >= kMaxBodies) break;
       BodyDef def = draw_body(bytes);
       def.filter = draw_filter(bytes);
       def.sensor = bytes.chance(Real(0.7));
+      if (bytes.chance(Real(0.3))) def.motion_locks = draw_locks(bytes);
       def.user_data = bytes.next();
       twins.both([&](World& w) { return w.add(def); });
       break;
@@ -282,6 +284,13 @@ void change_properties(Bytes& bytes, Twins& twins) {
     case 7: {
       const Real linear = bytes.number(Real(0.5), 1), angular = bytes.number(Real(0.5), 1);
       twins.both([&](World& w) { w.set_damping(id, linear, angular); });
+      break;
+    }
+    case 8: {
+      const MotionLocks locks = draw_locks(bytes);
+      const auto set = twins.both([&](World& w) { w.set_motion_locks(id, locks); });
+      require(!set || !(twins.world().mass(id) > 0) || twins.world().motion_locks(id) == locks,
+              "locks are what was set");
       break;
     }
     default:

@@ -193,6 +193,15 @@ BodyDef draw_body(Bytes& bytes) {
   return def;
 }
 
+MotionLocks draw_locks(Bytes& bytes) {
+  MotionLocks locks;
+  for (bool* lock : {&locks.linear_x, &locks.linear_y, &locks.linear_z, &locks.angular_x,
+                     &locks.angular_y, &locks.angular_z}) {
+    *lock = bytes.chance(Real(0.5));
+  }
+  return locks;
+}
+
 CollisionFilter draw_filter(Bytes& bytes) {
   CollisionFilter filter;
   if (bytes.chance(Real(0.6))) filter.category = static_cast<std::uint32_t>(bytes.below(8));

@@ -11,6 +11,7 @@ namespace fuzz {
 
 Scene draw_scene(test::Bytes& bytes);
 BodyDef draw_body(test::Bytes& bytes);
+MotionLocks draw_locks(test::Bytes& bytes);
 CollisionFilter draw_filter(test::Bytes& bytes);
 BodyState draw_state(test::Bytes& bytes);
 WorldSettings draw_settings(test::Bytes& bytes);

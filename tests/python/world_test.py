@@ -217,6 +217,9 @@ def test_bodies_are_added_changed_and_removed():
     assert world.restitution(ball) == 0.75 and world.acceleration(ball) == (0, -1, 0)
     assert world.damping(ball) == (0.5, 0.25) and world.filter(ball) == (2, 6)
     assert not world.sensor(ball)
+    assert world.motion_locks(ball) == ((False, False, False), (False, False, False))
+    world.set_motion_locks(ball, (False, False, True), angular=(True, True, False))
+    assert world.motion_locks(ball) == ((False, False, True), (True, True, False))
     other = world.add(BALL)
     world.set_pair_ignored(ball, other, True)
     assert world.pair_ignored(other, ball)
@@ -224,6 +227,18 @@ def test_bodies_are_added_changed_and_removed():
     assert ball not in world and world.bodies == [world.body_at(0), other]
     with pytest.raises(jfpx.InvalidArgument):
         world.state(ball)
+
+
+def test_a_body_does_not_move_along_and_about_locked_axes():
+    world = jfpx.World({"bodies": [{**FREE, "motion_locks": {"linear_x": True, "angular_z": True}}]})
+    body = world.bodies[0]
+    world.apply_impulse(body, (1, 1, 1), (0, 0.5, 0))
+    world.set_states(world.states()._replace(angular_velocities=np.ones((1, 3), np.float32)))
+    assert world.state(body).velocity[0] == 0 and world.state(body).velocity[1] > 0
+    assert world.state(body).angular_velocity == (1, 1, 0)
+    world.set_motion_locks(body)
+    world.apply_impulse(body, (1, 0, 0))
+    assert world.state(body).velocity[0] > 0
 
 
 def test_contacts_have_indices_of_bodies_also_after_a_removal():
@@ -785,6 +800,9 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.set_mass(w.bodies[0], -1), jfpx.InvalidArgument, "mass"),
     (lambda w: w.set_friction(w.bodies[0], "high"), jfpx.InvalidArgument, "friction is 'high'"),
     (lambda w: w.set_filter(w.bodies[0], -1, 0), jfpx.InvalidArgument, "category is -1"),
+    (lambda w: w.set_motion_locks(w.bodies[0], 1), jfpx.InvalidArgument, "linear is 1; it must be 3"),
+    (lambda w: w.set_motion_locks(w.bodies[0], angular=(1, 0, 0)), jfpx.InvalidArgument,
+     r"angular is \(1, 0, 0\); it must be 3 truth values"),
     (lambda w: w.apply_force(w.bodies[0], (1, 2)), jfpx.InvalidArgument, "force has 2 numbers"),
     (lambda w: w.apply_force(w.bodies[0], 1), jfpx.InvalidArgument, "force is 1"),
     (lambda w: w.apply_force(w.bodies[0], (float("nan"), 0, 0)), jfpx.InvalidArgument, "force"),

@@ -247,6 +247,7 @@ TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   EXPECT_THAT(to_json(scene), Not(HasSubstr("sensor")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("rolling_friction")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("spinning_friction")));
+  EXPECT_THAT(to_json(scene), Not(HasSubstr("motion_locks")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("user_data")));
   EXPECT_THAT(to_json(scene), Not(HasSubstr("ignored_pairs")));
   scene.bodies.push_back(scene.bodies[0]);
@@ -254,6 +255,7 @@ TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   scene.bodies[1].sensor = true;
   scene.bodies[1].rolling_friction = Real(0.5);
   scene.bodies[1].spinning_friction = Real(0.25);
+  scene.bodies[1].motion_locks = kPlanarMotion;
   scene.bodies[1].user_data = 9007199254740993u;
   scene.ignored_pairs = {{1, 0}};
   const std::string text = to_json(scene);
@@ -261,6 +263,8 @@ TEST(SceneJson, NewerFieldsAreWrittenOnlyIfTheyAreNotTheDefault) {
   EXPECT_THAT(text, HasSubstr("\"sensor\":true"));
   EXPECT_THAT(text, HasSubstr("\"rolling_friction\":0.5"));
   EXPECT_THAT(text, HasSubstr("\"spinning_friction\":0.25"));
+  EXPECT_THAT(text, HasSubstr("\"motion_locks\":{\"linear_z\":true,\"angular_x\":true,"
+                              "\"angular_y\":true}"));
   EXPECT_THAT(text, HasSubstr("\"user_data\":9007199254740993"));
   EXPECT_THAT(text, HasSubstr("\"ignored_pairs\": [[1,0]]"));
   EXPECT_EQ(from_json(text), scene);
@@ -276,6 +280,7 @@ TEST(SceneJson, TheOrderOfFieldsIsFixed) {
   body.sensor = true;
   body.rolling_friction = body.spinning_friction = Real(0.5);
   body.acceleration = {};
+  body.motion_locks.linear_y = true;
   body.user_data = 7;
   EXPECT_EQ(to_json(scene), R"({"jfpx_scene": 2,
  "name": "unnamed",
@@ -298,7 +303,8 @@ TEST(SceneJson, TheOrderOfFieldsIsFixed) {
                             R"("can_sleep":true,)"
                             R"("inertia":[[1.0,0.0,0.0],[0.0,1.0,0.0],[0.0,0.0,1.0]],)"
                             R"("filter":{"category":1,"mask":6},"rolling_friction":0.5,)"
-                            R"("spinning_friction":0.5,"sensor":true,"user_data":7}
+                            R"("spinning_friction":0.5,"sensor":true,)"
+                            R"("motion_locks":{"linear_y":true},"user_data":7}
 ]}
 )");
 }
@@ -311,6 +317,8 @@ TEST(SceneJson, ErrorsOfNewerFieldsNameFieldValueAndRange) {
               HasSubstr("body 0.user_data: is "));
   EXPECT_EQ(complaint(with_body("\"sensor\": 1")),
             "body 0.sensor: is a number; it must be a boolean");
+  EXPECT_EQ(complaint(with_body("\"motion_locks\": {\"angular_y\": 1}")),
+            "body 0.motion_locks.angular_y: is a number; it must be a boolean");
   EXPECT_EQ(complaint(with_body("\"filter\": {\"category\": -1}")),
             "body 0.filter.category: is -1; it must be a whole number from 0 to 4294967295");
   EXPECT_EQ(complaint(with_body("\"filter\": {\"mask\": 4294967296}")),

@@ -100,6 +100,16 @@ TEST(Validate, MessagesNameBodyFieldValueAndRange) {
   EXPECT_EQ(message(scene), "body 0: radius is 0; it must be > 0 and at most 1e9");
 }
 
+TEST(Validate, MotionLocksNeedTheSoftStep) {
+  Scene scene = valid_scene();
+  scene.bodies[1].motion_locks.angular_y = true;
+  scene.solver = Solver::worst_first;
+  EXPECT_EQ(message(scene),
+            "body 1: solver is worst_first; it must be soft_step for a body with motion_locks");
+  scene.solver = Solver::soft_step;
+  EXPECT_EQ(message(scene), "");
+}
+
 struct Fault {
   const char* field;
   std::function<void(Scene&, Real)> put;

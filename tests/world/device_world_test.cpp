@@ -78,8 +78,10 @@ Scene random_scene(Random* random) {
   scene.soft_step.substeps =
       random->below(12) == 0 ? kMaxSubsteps : 1 + static_cast<std::uint32_t>(random->below(6));
   const std::uint64_t count = 2 + random->below(60);
+  const bool any_locks = random->below(3) == 0;
   for (std::uint64_t i = 0; i < count; ++i) {
     BodyDef def = test::random_body(random, 3);
+    if (any_locks) def.motion_locks = test::random_locks(random);
     def.velocity = def.mass > 0 ? random->uniform_in_box({-3, -3, -3}, {3, 3, 3}) : Vec3{};
     def.friction = random->uniform(0, 1);
     def.restitution = random->below(2) == 0 ? Real(0) : random->uniform(0, 1);
@@ -375,12 +377,13 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
     int uploads = 0;
     for (int n = 0; n < scene_steps(60); ++n) {
       for (std::uint64_t changes = 1 + random.below(3); changes > 0; --changes) {
-        const std::uint64_t action = random.below(20);
+        const std::uint64_t action = random.below(22);
         const auto at = [&](const World& world, std::uint64_t i) {
           return world.bodies()[i % world.bodies().size()];
         };
         const std::uint64_t i = random.below(1000);
         const BodyDef def = test::random_body(&random, 3);
+        const MotionLocks locks = test::random_locks(&random);
         const Vec3 force = random.uniform_in_box({-9, -9, -9}, {9, 9, 9});
         for (World* world : {&host, &device}) {
           const BodyId id = at(*world, i);
@@ -412,6 +415,7 @@ TEST_P(DeviceWorldTest, ChangesBetweenStepsReachTheDevice) {
             if (other != id) world->set_pair_ignored(id, other, !world->pair_ignored(id, other));
           }
           if (action == 12 && world->mass(id) > 0) world->set_mass(id, 0.3_r + absolute(force.z));
+          if (action >= 20) world->set_motion_locks(id, locks);
           if (action == 18) world->apply_impulse_at_point(id, force, def.position);
           if (action == 19) {
             world->apply_impulse(id, force);

@@ -420,7 +420,8 @@ TEST_P(Property, OfARemovedBodyIsAnErrorAndNotInherited) {
            [&] { world.set_acceleration(gone, {}); }, [&] { world.linear_damping(gone); },
            [&] { world.angular_damping(gone); }, [&] { world.set_damping(gone, 1, 1); },
            [&] { world.user_data(gone); }, [&] { world.set_user_data(gone, 1); },
-           [&] { world.sensor(gone); }}) {
+           [&] { world.sensor(gone); }, [&] { world.motion_locks(gone); },
+           [&] { world.set_motion_locks(gone, {}); }}) {
     EXPECT_NE(complaint(call).find("body id (index 0, generation 0) is unknown"),
               std::string::npos);
   }

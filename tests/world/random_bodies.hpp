@@ -129,6 +129,20 @@ inline BodyDef random_body(Random* random, Real room) {
   return def;
 }
 
+/// No locks, those of a character or of a plane, or any.
+inline MotionLocks random_locks(Random* random) {
+  const std::uint64_t kind = random->below(8);
+  if (kind < 4) return {};
+  if (kind == 4) return kFixedRotation;
+  if (kind == 5) return kPlanarMotion;
+  const auto any = [random] { return random->below(2) == 0; };
+  MotionLocks locks;
+  locks.angular_x = any(), locks.angular_y = any(), locks.angular_z = any();
+  if (kind == 6) return locks;
+  locks.linear_x = any(), locks.linear_y = any(), locks.linear_z = any();
+  return locks;
+}
+
 inline DistanceJoint random_distance_joint(Random* random, BodyId a, std::optional<BodyId> b) {
   DistanceJoint joint{.a = a, .b = b};
   const auto anchor = [&]() -> Vec3 {

@@ -35,10 +35,11 @@ inline Scene random_room(Random* random) {
 class Change {
  public:
   Change(Random* random, double time)
-      : action_(random->below(16)),
+      : action_(random->below(17)),
         i_(random->below(1000)),
         j_(random->below(1000)),
         def_(random_body(random, 3)),
+        locks_(random_locks(random)),
         vector_(random->uniform_in_box({-9, -9, -9}, {9, 9, 9})),
         joint_(random_joint(random, {},
                             random->below(4) == 0 ? std::nullopt : std::optional(BodyId{}))),
@@ -71,7 +72,8 @@ class Change {
         if (gravity != nullptr) world->force<Gravity>(force).acceleration = vector_;
       }
     }
-    if (action_ >= 12) change_joints(world, id);
+    if (action_ == 16) world->set_motion_locks(id, locks_);
+    if (action_ >= 12 && action_ < 16) change_joints(world, id);
   }
 
  private:
@@ -101,6 +103,7 @@ class Change {
 
   std::uint64_t action_, i_, j_;
   BodyDef def_;
+  MotionLocks locks_;
   Vec3 vector_;
   Joint joint_;
   Real start_;

@@ -45,6 +45,7 @@ void expect_repeats(const std::string& path, const World& original) {
   for (const BodyId id : world.bodies()) {
     EXPECT_EQ(world.user_data(id), original.user_data(id));
     EXPECT_EQ(world.filter(id), original.filter(id));
+    EXPECT_EQ(world.motion_locks(id), original.motion_locks(id));
   }
 }
 
@@ -82,7 +83,7 @@ void change(RecordedWorld& world, Random* random) {
   const Real number = random->uniform(0.1_r, 0.9_r);
   const bool movable = world.world().mass(id) > 0;
   const std::span<const ForceId> forces = world.world().forces();
-  switch (random->below(22)) {
+  switch (random->below(23)) {
     case 0:
       world.add(random_body(random, 3));
       break;
@@ -141,6 +142,11 @@ void change(RecordedWorld& world, Random* random) {
       break;
     case 20:
       world.apply_angular_impulse(id, vector);
+      break;
+    case 21:
+      if (world.world().settings().solver == Solver::soft_step) {
+        world.set_motion_locks(id, random_locks(random));
+      }
       break;
     case 16:
       world.add_force(random_force(random, bodies));

@@ -55,6 +55,7 @@ Scene busy_scene(std::uint64_t seed) {
     def.user_data = random.next();
     if (random.below(5) == 0) def.filter = {.category = 2, .mask = 1};
     if (random.below(9) == 0) def.sensor = true;
+    if (scene.solver == Solver::soft_step) def.motion_locks = test::random_locks(&random);
     scene.bodies.push_back(def);
   }
   BodyDef platform;
@@ -105,6 +106,9 @@ void meddle(World& world, Random* random) {
   if (world.mass(id) > 0) world.set_inertia(id, diagonal({1.5_r, 1.25_r, 1}));
   world.set_friction(any(), 0.25_r);
   world.set_damping(any(), 0.75_r, 0.5_r);
+  if (world.settings().solver == Solver::soft_step) {
+    world.set_motion_locks(any(), test::random_locks(random));
+  }
   world.set_acceleration(any(), {0, -5, 0});
   world.set_filter(any(), {.category = 4, .mask = 5});
   const BodyId first = any(), second = any();
@@ -461,7 +465,7 @@ TEST_P(Snapshots, ErrorsNameTheCause) {
   };
   EXPECT_THAT(complaint(world, {}), HasSubstr("not a snapshot of jfpx"));
   EXPECT_THAT(complaint_with(0, 'X'), HasSubstr("not a snapshot of jfpx"));
-  EXPECT_THAT(complaint_with(8, 9), HasSubstr("is of version 9; this build reads versions 1 to 5"));
+  EXPECT_THAT(complaint_with(8, 9), HasSubstr("is of version 9; this build reads versions 1 to 6"));
   EXPECT_THAT(complaint_with(12, sizeof(Real) == 4 ? 8 : 4),
               HasSubstr(sizeof(Real) == 4 ? "is float64 (double precision); it must be float32"
                                           : "is float32 (single precision); it must be float64"));
@@ -540,6 +544,27 @@ TEST_P(Snapshots, OfBadContentIsAnErrorOrAWorldThoughTheChecksumIsRight) {
     bad.bytes.resize(size);
     seal(&bad);
     EXPECT_NE(complaint(world, bad), "") << "size " << size;
+  }
+}
+
+TEST(SnapshotsOfLocks, OfBadContentAreAnErrorOrAWorldThoughTheChecksumIsRight) {
+  Scene scene;
+  scene.bodies = {test::ground(), test::ball({0, 1, 0}), test::ball({3, 1, 0}),
+                  test::ball({6, 1, 0})};
+  for (std::size_t i = 1; i < 4; ++i) scene.bodies[i].velocity = {1, 2, 3};
+  scene.bodies[1].motion_locks = kFixedRotation;
+  scene.bodies[2].motion_locks = kPlanarMotion;
+  World world(scene);
+  world.step();
+  constexpr std::size_t kBytesOfLocks = 4 * 6, kChecksum = 8;
+  std::size_t accepted = 0;
+  const std::set<std::string> complaints = complaints_about_bytes(
+      world, world.snapshot().bytes.size() - kBytesOfLocks - kChecksum, &accepted);
+  EXPECT_GT(accepted, 20u);
+  for (const char* reason :
+       {"a body of mass 0 has locked axes, or a body moves along or about a locked axis",
+        "a truth value is neither 0 nor 1"}) {
+    EXPECT_TRUE(complaints.contains(std::string("the snapshot is corrupt: ") + reason)) << reason;
   }
 }
 

@@ -43,6 +43,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/joint_world_test.cpp
   world/kinematic_test.cpp
   world/mixed_test.cpp
+  world/motion_locks_test.cpp
   world/motion_test.cpp
   world/property_test.cpp
   world/query_test.cpp

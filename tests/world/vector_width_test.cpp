@@ -1,5 +1,5 @@
 /// Worlds have the same bits for all vector widths of the processor.
-#include "tests/world/support.hpp"
+#include "tests/world/random_bodies.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,6 +14,7 @@ Scene random_bodies(Random* random, bool any_boxes) {
   scene.soft_step.substeps = 1 + static_cast<std::uint32_t>(random->below(5));
   const std::uint64_t count = 1 + random->below(any_boxes ? 150 : 300);
   const bool rebounds = random->below(2) == 0, rolls = random->below(4) == 0;
+  const bool any_locks = random->below(3) == 0;
   for (std::uint64_t i = 0; i < count; ++i) {
     BodyDef def = test::heavy(random->uniform_in_box({-3, 0, -3}, {3, 8, 3}));
     def.shape = Sphere{random->uniform(0.2_r, 0.9_r)};
@@ -29,6 +30,7 @@ Scene random_bodies(Random* random, bool any_boxes) {
       def.angular_velocity = random->uniform_in_box({-spin, -spin, -spin}, {spin, spin, spin});
       def.angular_damping = random->below(2) == 0 ? 1 : random->uniform(0.5_r, 1);
     }
+    if (any_locks) def.motion_locks = test::random_locks(random);
     if (rebounds) def.restitution = random->uniform(0, 1);
     if (rolls && random->below(2) == 0) def.rolling_friction = 0.02_r;
     scene.bodies.push_back(def);

@@ -58,6 +58,7 @@ struct StageTimes {
 /// - filters: the collision filter groups and masks of Bullet, if any filter is not the default. A
 ///   kinematic body then also gets contact points with other bodies of mass 0; these points have no
 ///   effect;
+/// - motion locks: setLinearFactor() and setAngularFactor();
 /// - sensor: CF_NO_CONTACT_RESPONSE;
 /// - ignored pairs: btCollisionObject::setIgnoreCollisionCheck();
 /// - a body that must not sleep, and every body of a scene without sleep: DISABLE_DEACTIVATION.

@@ -8,6 +8,7 @@
 #include "src/scene/inertia_tensor.hpp"
 #include "src/scene/principal_inertia.hpp"
 #include "src/world/bodies/integrate.hpp"
+#include "src/world/bodies/motion_locks.hpp"
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
@@ -255,6 +256,14 @@ Real factor(CombineRule rule, Real coefficient) {
   return rule == CombineRule::product ? coefficient : square_root(coefficient);
 }
 
+/// Locks axes of motion, and ends the motion along and about them.
+void lock_motion(btRigidBody* body, const MotionLocks& locks) {
+  body->setLinearFactor(to_bullet(detail::free_linear(locks, {1, 1, 1})));
+  body->setAngularFactor(to_bullet(detail::free_angular(locks, {1, 1, 1})));
+  body->setLinearVelocity(body->getLinearVelocity() * body->getLinearFactor());
+  body->setAngularVelocity(body->getAngularVelocity() * body->getAngularFactor());
+}
+
 std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInertia& own,
                                        const MaterialSettings& materials, btCollisionShape* shape,
                                        bool can_sleep) {
@@ -289,6 +298,7 @@ std::unique_ptr<btRigidBody> make_body(const BodyDef& def, const PrincipalInerti
     body->setLinearVelocity(to_bullet(def.velocity));
     body->setAngularVelocity(to_bullet(def.angular_velocity));
   }
+  if (mass > 0 && def.motion_locks != MotionLocks{}) lock_motion(body.get(), def.motion_locks);
   if (mass > 0 && !can_sleep) {
     body->setActivationState(DISABLE_DEACTIVATION);
   }

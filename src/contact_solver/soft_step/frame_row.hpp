@@ -236,7 +236,7 @@ class FrameSolver {
     if (row->parameters.is_plain != 0) return;
     Mat3 inertia = *pair_.inertia_a;
     if constexpr (!kFixed) inertia = inertia + *pair_.inertia_b;
-    angular_response_ = in_base(inertia);
+    angular_response_ = in_base(regular_response(inertia));
   }
 
   /// In the first sweep of a substep: replaces the impulses of the last substep, which were applied

@@ -21,11 +21,13 @@ JFPX_HD inline Real most_correction(const StepConstants& step) {
 /// Larger angles are inexact, because the impulse changes the velocities too much.
 inline constexpr Real kMostTurn = Real(1) / 16;
 
-/// Inverse inertia in world axes of a body that has rotated since the start of the step.
+/// Inverse inertia in world axes of a body that has rotated since the start of the step. That of a
+/// body with a locked rotation stays: it does not rotate with the body, and is the same at any time
+/// if the body rotates about one axis.
 JFPX_HD inline Mat3 turned_inertia(const SolverBody& body, const Mat3& at_start, const Quat& start,
                                    const Quat& now) {
   const bool is_isotropic = body.inverse_inertia > 0;
-  if (is_isotropic || now == start) return at_start;
+  if (is_isotropic || now == start || locks_rotation(at_start)) return at_start;
   const Mat3 turn = to_matrix(now * conjugate(start));
   return turn * (at_start * transposed(turn));
 }

@@ -182,6 +182,7 @@ template <bool kFixed>
 JFPX_HD inline void solve_rolling(ManifoldRow* row, Real pressure, const BodyPair& pair) {
   Mat3 response = *pair.inertia_a;
   if constexpr (!kFixed) response = response + *pair.inertia_b;
+  response = regular_response(response);
   Mat3 mass;
   const Real scale = response(0, 0) + response(1, 1) + response(2, 2);
   if (!(scale > 0) || !invert(response * (1 / scale), &mass)) return;

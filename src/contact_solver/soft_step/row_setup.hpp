@@ -207,6 +207,10 @@ struct RowSetup {
     SolverBody a = start[row->a], b = start[row->b];
     const BodyPair pair{&a, &b, &properties.inverse_inertia[row->a],
                         &properties.inverse_inertia[row->b]};
+    // The points of a body that cannot tilt have the same effect. Each gets its share of the mass,
+    // so that together they are as soft as those of other bodies.
+    const bool is_locked =
+        locks_rotation(*pair.inertia_a) || (!kFixed && locks_rotation(*pair.inertia_b));
     const FrictionPoints from(*this, *row, contact);
     Vec3 centre_a, centre_b;
     for (std::uint32_t i = 0; i < row->count; ++i) {
@@ -229,7 +233,9 @@ struct RowSetup {
       p.distance = from.distance(i);
       p.normal_impulse = kept[i].normal;
       set_lever<kFixed>(pair, arms.a, arms.b, row->normal, &p);
-      p.normal_mass = 1 / (linear_response<kFixed>(pair) + turning(p, p));
+      const Real linear = linear_response<kFixed>(pair), response = linear + turning(p, p);
+      const Real shared = linear * static_cast<Real>(row->count);
+      p.normal_mass = 1 / (is_locked && response < shared ? shared : response);
       p.rebound = -rebound_speed(relative_velocity(pair, arms.a, arms.b), row->normal, p.distance,
                                  row->a, row->b, restitution);
     }

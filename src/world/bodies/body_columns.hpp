@@ -49,8 +49,9 @@ struct PropertyColumns {
   Column<std::uint8_t> kinematic{}, sensor{}, can_sleep{};  ///< 1 or 0
   Column<Vec3> acceleration{};                              ///< BodyDef::acceleration
   Column<Real> friction{}, restitution{}, rolling_friction{}, spinning_friction{};
-  Column<CollisionFilter> filter{};  ///< the default in unused slots
-  Column<Real> radius{};             ///< [m]; 0 for a body that is not a sphere, as for compounds
+  Column<CollisionFilter> filter{};    ///< the default in unused slots
+  Column<MotionLocks> motion_locks{};  ///< none for mass 0
+  Column<Real> radius{};               ///< [m]; 0 for a body that is not a sphere, as for compounds
   /// [m], of the bounding sphere about the centre of mass; infinite for half-spaces and planes
   Column<Real> extent{};
   Column<Real> inverse_mass{};
@@ -63,7 +64,7 @@ template <template <class> class Column>
 struct InertiaColumns {
   Column<Mat3> body_inverse_inertia{};
   /// Divided by its largest diagonal entry, for the gyroscopic term; zero if that term is zero
-  /// (isotropic inertia or mass 0).
+  /// (isotropic inertia or mass 0), or if the rotation about an axis is locked.
   Column<Mat3> tensor{};
 };
 
@@ -128,6 +129,7 @@ JFPX_HD constexpr void each_property(const Visit& visit, Columns&... columns) {
   visit(columns.rolling_friction...);
   visit(columns.spinning_friction...);
   visit(columns.filter...);
+  visit(columns.motion_locks...);
   visit(columns.radius...);
   visit(columns.extent...);
   visit(columns.inverse_mass...);
@@ -173,7 +175,7 @@ void each_given(Motion& motion, Properties& properties, Host& host, Inertia& giv
                 Def& def, const Visit& visit) {
   auto& [shape, mass, kinematic, inertia, position, orientation, velocity, angular_velocity,
          acceleration, linear_damping, angular_damping, friction, restitution, rolling_friction,
-         spinning_friction, can_sleep, filter, sensor, user_data] = def;
+         spinning_friction, can_sleep, filter, sensor, motion_locks, user_data] = def;
   visit(host.shape, shape);
   visit(host.mass, mass);
   visit(properties.kinematic, kinematic);
@@ -188,6 +190,7 @@ void each_given(Motion& motion, Properties& properties, Host& host, Inertia& giv
   visit(properties.rolling_friction, rolling_friction);
   visit(properties.spinning_friction, spinning_friction);
   visit(properties.filter, filter);
+  visit(properties.motion_locks, motion_locks);
   visit(host.user_data, user_data);
   visit(motion.position, position);
   visit(motion.orientation, orientation);

@@ -103,6 +103,7 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
   if (kinematic(i)) ++kinematic_count_;
   if (sensor(i)) ++sensor_count_;
   if (rolls(i)) ++rolling_count_;
+  if (has_locks(i)) ++locked_count_;
   note_mobile(i);
 }
 
@@ -127,7 +128,8 @@ BodyId BodyStore::add(const BodyDef& def) {
   Shape shape = normalized(def.shape);  // may throw, hence before any change
   std::map<std::uint32_t, Mat3> given;
   if (def.inertia && def.mass > 0) given[0] = {};
-  if (needs_inertia_arrays(def.shape, def.mass, def.kinematic, def.inertia.has_value())) {
+  if (needs_inertia_arrays(def.shape, def.mass, def.kinematic, def.inertia.has_value(),
+                           def.motion_locks)) {
     make_inertia_arrays();
   }
   if (pool_.is_full()) add_slot();
@@ -142,6 +144,7 @@ BodyId BodyStore::add(const BodyDef& def) {
   each_given(moving, properties_, host_, given_inertia_, def, PutValue{i});
   host_.shape[i] = std::move(shape);
   if (!sleep_.enabled) properties_.can_sleep[i] = 0;
+  if (!(def.mass > 0)) properties_.motion_locks[i] = {};
   derive_properties(i);
   compute_inertia(i, def.inertia);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
@@ -165,9 +168,10 @@ Mat3 BodyStore::inertia(std::uint32_t i) const {
 }
 
 bool BodyStore::needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
-                                     bool inertia_given) {
+                                     bool inertia_given, const MotionLocks& locks) {
   const bool is_solid_ball = std::holds_alternative<Sphere>(shape) && !inertia_given;
-  return kinematic || (mass > 0 && !is_solid_ball);
+  const bool turns_alike = !detail::any_angular(locks) || detail::all_angular(locks);
+  return kinematic || (mass > 0 && !(is_solid_ball && turns_alike));
 }
 
 void BodyStore::make_inertia_arrays() {
@@ -212,8 +216,20 @@ void BodyStore::set_tensor(std::uint32_t i, const Mat3& tensor) {
   // The largest entry of a positive definite matrix is on its diagonal.
   const Vec3 moments{tensor(0, 0), tensor(1, 1), tensor(2, 2)};
   const bool isotropic = moments.x == moments.y && moments.y == moments.z && is_diagonal(tensor);
-  inertia_.tensor[i] = isotropic ? diagonal({0, 0, 0})
-                                 : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+  inertia_.tensor[i] = isotropic || detail::any_angular(motion_locks(i))
+                           ? diagonal({0, 0, 0})
+                           : tensor * (Real(1) / std::max({moments.x, moments.y, moments.z}));
+}
+
+void BodyStore::set_motion_locks(std::uint32_t i, const MotionLocks& locks) {
+  if (!movable(i)) return;
+  if (needs_inertia_arrays(host_.shape[i], host_.mass[i], false, inertia_given(i), locks)) {
+    make_inertia_arrays();
+  }
+  if (has_locks(i)) --locked_count_;
+  properties_.motion_locks[i] = locks;
+  if (has_locks(i)) ++locked_count_;
+  if (has_inertia_arrays_) set_tensor(i, inertia(i));
 }
 
 void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
@@ -231,6 +247,7 @@ void BodyStore::remove(BodyId id) noexcept {
   if (kinematic(id.index)) --kinematic_count_;
   if (sensor(id.index)) --sensor_count_;
   if (rolls(id.index)) --rolling_count_;
+  if (has_locks(id.index)) --locked_count_;
   moving.awake[id.index] = 0;
   given_inertia_.erase(id.index);
   ignored_.erase_body(id.index);
@@ -255,8 +272,7 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
   moving.position[i] = state.position;
   moving.orientation[i] = normalized(state.orientation);
   const bool moves = movable(i) || kinematic(i);
-  moving.velocity[i] = moves ? state.velocity : Vec3{};
-  moving.angular_velocity[i] = moves ? state.angular_velocity : Vec3{};
+  put_velocities(i, moves ? state : BodyState{});
   refresh_inertia(i);
   wake(i);
   if (!kinematic(i)) return;
@@ -265,9 +281,14 @@ void BodyStore::set_state(std::uint32_t i, const BodyState& state) {
 }
 
 void BodyStore::set_velocities(std::uint32_t i, const BodyState& state) {
-  moving.velocity[i] = state.velocity;
-  moving.angular_velocity[i] = state.angular_velocity;
+  put_velocities(i, state);
   wake(i);
+}
+
+/// Replaces the velocities, except along and about locked axes.
+void BodyStore::put_velocities(std::uint32_t i, const BodyState& state) {
+  moving.velocity[i] = detail::free_linear(motion_locks(i), state.velocity);
+  moving.angular_velocity[i] = detail::free_angular(motion_locks(i), state.angular_velocity);
 }
 
 void BodyStore::set_filter(std::uint32_t i, const CollisionFilter& filter) noexcept {
@@ -345,6 +366,7 @@ BodyView BodyStore::view_without_ids() const {
   view.joined = joined_.keys().data();
   view.joined_count = static_cast<std::uint32_t>(joined_.keys().size());
   view.filters_in_use = filters_in_use_;
+  view.any_locks = locked_count_ > 0;
   view.count = static_cast<std::uint32_t>(size());
   view.capacity = static_cast<std::uint32_t>(capacity());
   view.movable_count = movable_count_;
@@ -364,8 +386,10 @@ MotionPointers BodyStore::motion_pointers() {
 }
 
 void BodyStore::refresh_inertia(std::uint32_t i) {
-  moving.inverse_inertia[i] =
-      detail::in_world_axes(body_inverse_inertia(i), to_matrix(moving.orientation[i]));
+  const Mat3 inverse = body_inverse_inertia(i), axes = to_matrix(moving.orientation[i]);
+  moving.inverse_inertia[i] = detail::any_angular(motion_locks(i))
+                                  ? detail::locked_inverse_inertia(motion_locks(i), inverse, axes)
+                                  : detail::in_world_axes(inverse, axes);
 }
 
 }  // namespace JFPX_ABI

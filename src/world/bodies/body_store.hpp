@@ -74,6 +74,10 @@ class BodyStore {
   void write_places(BinaryWriter* writer) const;
   /// Reads what write_places() has written, after read(). @throws InvalidSnapshot, std::bad_alloc
   void read_places(BinaryReader* reader);
+  /// Writes the motion locks of all bodies.
+  void write_locks(BinaryWriter* writer) const;
+  /// Reads what write_locks() has written, after read(). @throws InvalidSnapshot, std::bad_alloc
+  void read_locks(BinaryReader* reader);
   /// Whether a body has the index.
   bool lives(std::uint32_t body) const noexcept { return pool_.is_used(body); }
 
@@ -121,6 +125,14 @@ class BodyStore {
   void set_damping(std::uint32_t body, Real linear, Real angular);
   std::uint64_t user_data(std::uint32_t body) const { return host_.user_data[body]; }
   void set_user_data(std::uint32_t body, std::uint64_t value) { host_.user_data[body] = value; }
+  const MotionLocks& motion_locks(std::uint32_t body) const {
+    return properties_.motion_locks[body];
+  }
+  bool has_locks(std::uint32_t body) const { return motion_locks(body) != MotionLocks{}; }
+  bool any_locks() const { return locked_count_ > 0; }
+  /// Has no effect on a body of mass 0. set_velocities() or set_state() must follow: it ends the
+  /// motion along locked axes. @throws std::bad_alloc; the store is then unchanged
+  void set_motion_locks(std::uint32_t body, const MotionLocks& locks);
   bool sensor(std::uint32_t body) const { return properties_.sensor[body] != 0; }
   bool has_sensors() const { return sensor_count_ > 0; }
   /// Whether a body has rolling or spinning friction.
@@ -180,7 +192,8 @@ class BodyStore {
   void count_body(std::uint32_t body) noexcept;
   void note_mobile(std::uint32_t body) noexcept;
   static bool needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
-                                   bool inertia_given);
+                                   bool inertia_given, const MotionLocks& locks);
+  void put_velocities(std::uint32_t body, const BodyState& state);
   Mat3 body_inverse_inertia(std::uint32_t body) const;
   void compute_inertia(std::uint32_t body, const std::optional<Mat3>& given);
   void set_tensor(std::uint32_t body, const Mat3& tensor);
@@ -209,6 +222,7 @@ class BodyStore {
   Lazy<std::vector<std::uint32_t>> mobile_;
   std::uint64_t fixed_version_ = 1;
   std::uint32_t movable_count_ = 0, kinematic_count_ = 0, sensor_count_ = 0, rolling_count_ = 0;
+  std::uint32_t locked_count_ = 0;  ///< number of bodies with motion locks
 };
 
 }  // namespace JFPX_ABI

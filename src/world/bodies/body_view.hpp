@@ -7,6 +7,7 @@
 #include "src/scene/inertia.hpp"
 #include "src/world/bodies/body_columns.hpp"
 #include "src/world/bodies/integrate.hpp"
+#include "src/world/bodies/motion_locks.hpp"
 
 #include <cstdint>
 
@@ -23,6 +24,7 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   const std::uint64_t* joined = nullptr;  ///< keys of pairs excluded by joints, sorted
   std::uint32_t joined_count = 0;
   bool filters_in_use = false;
+  bool any_locks = false;  ///< whether a body may have `motion_locks`
 
   const BodyId* ids = nullptr;  ///< of the living bodies, sorted by index
   std::uint32_t count = 0;      ///< number of ids
@@ -40,9 +42,26 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   JFPX_HD bool is_asleep(std::uint32_t i) const { return movable(i) && awake[i] == 0; }
   /// Whether the body is kinematic and in motion.
   JFPX_HD bool is_carrier(std::uint32_t i) const { return !movable(i) && awake[i] != 0; }
-  /// Whether the body is a movable sphere whose inertia is the same about every axis.
+  /// Whether the body is a movable sphere whose inertia is the same about every axis. Also a sphere
+  /// that does not rotate: its inertia is infinite.
   JFPX_HD bool is_round(std::uint32_t i) const {
-    return movable(i) && radius[i] > 0 && !has_gyroscopic_term(i);
+    return movable(i) && radius[i] > 0 && !has_gyroscopic_term(i) &&
+           (!locks_rotation(i) || keeps_orientation(i));
+  }
+  /// Whether the body does not rotate about an axis, and whether it does not rotate at all.
+  JFPX_HD bool locks_rotation(std::uint32_t i) const {
+    return any_locks && detail::any_angular(motion_locks[i]);
+  }
+  JFPX_HD bool keeps_orientation(std::uint32_t i) const {
+    return any_locks && detail::all_angular(motion_locks[i]);
+  }
+  /// Whether the body does not move along any axis.
+  JFPX_HD bool keeps_position(std::uint32_t i) const {
+    return any_locks && detail::all_linear(motion_locks[i]);
+  }
+  /// The part of an acceleration or a motion that the locks of a body admit.
+  JFPX_HD Vec3 admitted(std::uint32_t i, const Vec3& motion) const {
+    return any_locks ? detail::free_linear(motion_locks[i], motion) : motion;
   }
   JFPX_HD bool has_gyroscopic_term(std::uint32_t i) const {
     return tensor != nullptr && tensor[i](0, 0) > 0;
@@ -74,7 +93,7 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
 
   /// Acceleration of a movable body by its constant acceleration and the accumulated force.
   JFPX_HD Vec3 acceleration_of_step(std::uint32_t i) const {
-    return add_scaled(acceleration[i], force[i], inverse_mass[i]);
+    return admitted(i, add_scaled(acceleration[i], force[i], inverse_mass[i]));
   }
 
   /// Displacement of the centre of mass during the next step, without contacts and damping [m];
@@ -121,8 +140,11 @@ struct StepMotion {
 /// The arrays of a BodyView that a step of soft_step changes.
 struct MotionPointers : MotionColumns<PointerColumn> {
   JFPX_HD void refresh_inertia(const BodyView& bodies, std::uint32_t i) const {
-    inverse_inertia[i] =
-        detail::in_world_axes(bodies.body_inverse_inertia[i], to_matrix(orientation[i]));
+    const Mat3& inverse = bodies.body_inverse_inertia[i];
+    const Mat3 axes = to_matrix(orientation[i]);
+    inverse_inertia[i] = bodies.locks_rotation(i)
+                             ? detail::locked_inverse_inertia(bodies.motion_locks[i], inverse, axes)
+                             : detail::in_world_axes(inverse, axes);
   }
 
   /// Wakes a movable body.
@@ -145,7 +167,8 @@ struct MotionPointers : MotionColumns<PointerColumn> {
   /// Stores the final state of an awake body.
   JFPX_HD void end_step(const BodyView& bodies, std::uint32_t i, const BodyState& state) const {
     position[i] = state.position;
-    orientation[i] = state.orientation;
+    // Not only equal up to the rounding of normalized().
+    if (!bodies.keeps_orientation(i)) orientation[i] = state.orientation;
     velocity[i] = state.velocity;
     angular_velocity[i] = state.angular_velocity;
     if (!bodies.is_round(i)) refresh_inertia(bodies, i);
@@ -169,7 +192,8 @@ struct MotionPointers : MotionColumns<PointerColumn> {
     const Real linear = length(motion.shift);
     const Real distance = linear < spin ? spin : linear;
     const bool is_slow = bodies.can_sleep[i] != 0 && distance <= limit &&
-                         !falls_freely(bodies.acceleration[i] * bodies.dt, motion.velocity_change);
+                         !falls_freely(bodies.admitted(i, bodies.acceleration[i]) * bodies.dt,
+                                       motion.velocity_change);
     rest_time[i] = is_slow ? rest_time[i] + bodies.dt : Real(0);
   }
 

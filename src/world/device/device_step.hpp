@@ -132,8 +132,8 @@ class DeviceStep final : public DeviceWorld {
       }
     }
     BodyView& to = data_.step.bodies;
-    if (to.filters_in_use != from.filters_in_use || to.ignored_count != from.ignored_count ||
-        to.joined_count != from.joined_count) {
+    if (to.any_locks != from.any_locks || to.filters_in_use != from.filters_in_use ||
+        to.ignored_count != from.ignored_count || to.joined_count != from.joined_count) {
       ++changes_;
     }
     to.capacity = from.capacity;
@@ -141,6 +141,7 @@ class DeviceStep final : public DeviceWorld {
     to.has_blocks = from.has_blocks;
     load_solver();
     to.filters_in_use = from.filters_in_use;
+    to.any_locks = from.any_locks;
     if (sets_pairs) bodies_.update_pairs(transfer_, from, &to);
     const Contacts& last = last_contacts();
     const std::size_t spheres = last.sizes().spheres;

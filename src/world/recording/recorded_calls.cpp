@@ -110,6 +110,7 @@ constexpr std::tuple kFunctions{
     Named{"set_damping", &World::set_damping},
     Named{"set_mass", &World::set_mass},
     Named{"set_inertia", &World::set_inertia},
+    Named{"set_motion_locks", &World::set_motion_locks},
     Named{"set_user_data", &World::set_user_data},
     Named{"set_filter", &World::set_filter},
     Named{"set_pair_ignored", &World::set_pair_ignored},

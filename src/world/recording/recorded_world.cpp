@@ -81,6 +81,9 @@ void RecordedWorld::set_mass(BodyId id, Real mass) {
 void RecordedWorld::set_inertia(BodyId id, const std::optional<Mat3>& inertia) {
   impl_->call("set_inertia", &World::set_inertia, id, inertia);
 }
+void RecordedWorld::set_motion_locks(BodyId id, const MotionLocks& locks) {
+  impl_->call("set_motion_locks", &World::set_motion_locks, id, locks);
+}
 void RecordedWorld::set_user_data(BodyId id, std::uint64_t user_data) {
   impl_->call("set_user_data", &World::set_user_data, id, user_data);
 }

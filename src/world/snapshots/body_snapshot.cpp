@@ -48,10 +48,11 @@ void BodyStore::serialize_body(Archive& archive, Self& self, std::uint32_t i) {
       archive(given[i]);
     }
   };
-  const auto column = [&](auto& values, const auto&...) {
+  const auto column = [&](auto& values, const auto& member) {
     if constexpr (Is<std::remove_reference_t<decltype(values)>, GivenInertia>) {
       inertia(values);
-    } else {
+    } else if constexpr (!Is<std::remove_reference_t<decltype(member)>, MotionLocks>) {
+      // Motion locks are in a later part of a snapshot.
       archive(values[i]);
     }
   };
@@ -100,6 +101,23 @@ void BodyStore::read_places(BinaryReader* reader) {
   }
 }
 
+void BodyStore::write_locks(BinaryWriter* writer) const {
+  for (const BodyId id : ids()) (*writer)(motion_locks(id.index));
+}
+
+void BodyStore::read_locks(BinaryReader* reader) {
+  for (const BodyId id : ids()) {
+    const auto locks = reader->get<MotionLocks>();
+    set_motion_locks(id.index, locks);
+    const Vec3 &v = moving.velocity[id.index], &w = moving.angular_velocity[id.index];
+    BinaryReader::require(
+        motion_locks(id.index) == locks && detail::free_linear(locks, v) == v &&
+            detail::free_angular(locks, w) == w,
+        "a body of mass 0 has locked axes, or a body moves along or about a locked axis");
+  }
+  BinaryReader::require(any_locks(), "it has locks of no body");
+}
+
 /// Reads generations and unused slots. @returns by slot: whether it is unused
 std::vector<bool> BodyStore::read_slots(BinaryReader* reader) {
   SnapshotSlots slots;
@@ -122,7 +140,7 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
     check_body(i);
     pool_.use(i);
     derive_properties(i);
-    if (needs_inertia_arrays(host_.shape[i], host_.mass[i], kinematic(i), inertia_given(i))) {
+    if (needs_inertia_arrays(host_.shape[i], host_.mass[i], kinematic(i), inertia_given(i), {})) {
       make_inertia_arrays();
     }
     inertia_given(i) ? set_tensor(i, given_inertia_.at(i)) : compute_inertia(i, std::nullopt);
@@ -148,7 +166,7 @@ void BodyStore::check_body(std::uint32_t i) const {
   BodyDef def = definition(i);
   if (auto* half_space = std::get_if<HalfSpace>(&def.shape)) check_wall(half_space);
   if (auto* plane = std::get_if<Plane>(&def.shape)) check_wall(plane);
-  validate_body(def, i);
+  validate_body(def, i, Solver::soft_step);  // without motion locks
   const auto check_flag = [i](const auto& column) {
     using Value = typename std::remove_cvref_t<decltype(column)>::value_type;
     if constexpr (std::is_same_v<Value, std::uint8_t>) {

@@ -4,8 +4,9 @@
 /// content (8 bytes), the content, and the checksum of all preceding bytes (8 bytes). A change of
 /// the content requires another version. Version 2 has joints after the content of version 1, and
 /// version 3 the places of bodies in the partition into blocks after them, and version 4 what
-/// recycle() reads of the contacts of boxes. Version 5 has the joints that have frames. A world
-/// that never had these has snapshots of version 1.
+/// recycle() reads of the contacts of boxes. Version 5 has the joints that have frames, and version
+/// 6 the motion locks of bodies after all others. A world that never had these has snapshots of
+/// version 1.
 #include "src/world/snapshots/snapshot_file.hpp"
 
 #include "src/base/file.hpp"
@@ -20,7 +21,7 @@ inline namespace JFPX_ABI {
 namespace {
 
 constexpr std::array<char, 8> kMagic{'J', 'F', 'P', 'X', 'S', 'N', 'P', '\n'};
-constexpr std::uint32_t kVersion = 1, kLatestVersion = 5;
+constexpr std::uint32_t kVersion = 1, kLatestVersion = 6;
 
 struct Header {
   std::array<char, 8> magic = kMagic;

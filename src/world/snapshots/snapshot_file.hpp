@@ -17,6 +17,7 @@ enum class SnapshotParts : std::uint8_t {
   joints_and_places,  ///< of a world that is or was divided into blocks
   recyclable,         ///< also of a world with contacts of boxes
   frames,             ///< all of these, and of a world with joints that have frames
+  locks,              ///< also of a world with bodies that have motion locks
 };
 
 /// Writes the header; the content must follow.

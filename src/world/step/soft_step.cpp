@@ -257,6 +257,12 @@ void SoftStep::for_each_part(const BodyStore& store, const Stage& stage) {
   });
 }
 
+/// StepBodies::hold() for the kernels, which do not know locks.
+void SoftStep::hold(std::span<const std::uint32_t> bodies) {
+  if (!step_.bodies.any_locks) return;
+  for (const std::uint32_t i : bodies) step_.hold(i, &step_.solver[i]);
+}
+
 /// Starts a substep of all active bodies.
 void SoftStep::accelerate_bodies(const BodyStore& store, bool is_first) {
   using soft_step::SubstepBody;
@@ -287,6 +293,7 @@ void SoftStep::accelerate_bodies(const BodyStore& store, bool is_first) {
       const std::size_t count =
           kernels->accelerate[kind](sweep, items[kind].data(), counts[kind], left.data());
       for (const std::uint32_t i : std::span(left).first(count)) accelerate(i, gyroscopic_[i]);
+      hold(std::span(items[kind]).first(counts[kind]));
     }
   });
 }
@@ -307,7 +314,9 @@ void SoftStep::move_bodies(const BodyStore& store) {
         step_.move(i, has_joints, &step_.orientation[i], &step_.solver[i]);
       }
     }
-    if (count > 0) kernels->move(sweep, items.data(), count);
+    if (count == 0) return;
+    hold(std::span(items).first(count));
+    kernels->move(sweep, items.data(), count);
   });
 }
 

@@ -78,6 +78,7 @@ class SoftStep {
   template <class Stage>
   void for_each_part(const BodyStore& bodies, const Stage& stage);
   cpu::BodySweep body_sweep(bool is_first);
+  void hold(std::span<const std::uint32_t> bodies);
   void accelerate_bodies(const BodyStore& bodies, bool is_first);
   void move_bodies(const BodyStore& bodies);
   void run_substeps(const BodyStore& bodies);

@@ -68,6 +68,10 @@ struct alignas(16) SubstepBody {
   JFPX_HD bool has(std::uint32_t flag) const { return (flags & flag) != 0; }
 };
 
+/// [-], factor of the inverse mass of a body that does not move along any axis. Rows act on it as
+/// on an immovable body, but none of them divides by 0.
+inline constexpr Real kHeldInverseMass = Real(1) / (1 << 20);
+
 /// The bodies of a step, as arrays by body.
 struct StepBodies {
   BodyView bodies;
@@ -89,18 +93,20 @@ struct StepBodies {
     body.velocity = bodies.velocity[i];
     body.angular_velocity = bodies.angular_velocity[i];
     body.inverse_mass = bodies.inverse_mass[i];
-    if (bodies.is_round(i)) body.inverse_inertia = bodies.inverse_inertia[i](0, 0);
+    if (bodies.keeps_position(i)) body.inverse_mass *= kHeldInverseMass;
+    const bool is_round = bodies.is_round(i);
+    if (is_round) body.inverse_inertia = bodies.inverse_inertia[i](0, 0);
     solver[i] = body;
-    traits[i] = traits_of(i, body);
+    traits[i] = traits_of(i, is_round);
     orientation[i] = bodies.orientation[i];
     if (constrained[i] >= kHasJoint) moved_rotation[i] = {};
   }
 
-  JFPX_HD std::uint8_t traits_of(std::uint32_t i, const SolverBody& body) const {
+  JFPX_HD std::uint8_t traits_of(std::uint32_t i, bool is_round) const {
     const bool is_movable = bodies.movable(i), is_awake = bodies.awake[i] != 0;
     std::uint8_t bits = is_movable ? BodyTraits::kMovable : 0;
     if (is_movable && is_awake) bits |= BodyTraits::kActive;
-    if (is_movable ? body.inverse_inertia > 0 : !is_awake) bits |= BodyTraits::kIsRound;
+    if (is_movable ? is_round : !is_awake) bits |= BodyTraits::kIsRound;
     if (bodies.rolling_friction[i] > 0 || bodies.spinning_friction[i] > 0) {
       bits |= BodyTraits::kRolls;
     }
@@ -152,6 +158,16 @@ struct StepBodies {
     *free = {velocity, angular_velocity};
     body->velocity = velocity + gained;
     body->angular_velocity = angular_velocity + spun;
+    hold(i, body);
+  }
+
+  /// Ends the motion of a body along its locked axes. The rows of contacts and joints use one
+  /// inverse mass for all directions. The locks thus act like a row that is solved after sweeps,
+  /// as in Box2D and Jolt. Locked rotations need nothing: the inverse inertia has them.
+  JFPX_HD void hold(std::uint32_t i, SolverBody* body) const {
+    if (!bodies.any_locks) return;
+    body->velocity = bodies.admitted(i, body->velocity);
+    body->shift = bodies.admitted(i, body->shift);
   }
 
   /// Ends a substep: integrates the velocities of a body that moves.
@@ -160,6 +176,7 @@ struct StepBodies {
   /// @param orientation_now changes
   JFPX_HD void move(std::uint32_t i, bool has_joints, Quat* orientation_now,
                     SolverBody* body) const {
+    hold(i, body);
     body->shift = add_scaled(body->shift, body->velocity, h);
     *orientation_now = turned(*orientation_now, *body);
     if (has_joints) {
@@ -177,10 +194,7 @@ struct StepBodies {
   }
 
   /// State of an awake body at the end of the step.
-  JFPX_HD BodyState state(std::uint32_t i) const {
-    return {bodies.position[i] + solver[i].shift, orientation[i], solver[i].velocity,
-            solver[i].angular_velocity};
-  }
+  JFPX_HD BodyState state(std::uint32_t i) const { return state(i, at_end(i)); }
 
   /// [rad], angle of the rotation of a body in the step, to first order. Not SolverBody::rotation,
   /// which a device leaves out in steps without manifolds.
@@ -196,9 +210,9 @@ struct StepBodies {
   JFPX_HD bool store(std::uint32_t i) const {
     bool rests = false;
     if (bodies.awake[i] != 0) {
-      const SolverBody& body = solver[i];
+      const SolverBody body = at_end(i);
       const StepMotion moved{body.shift, turn_of_step(i), body.velocity - bodies.velocity[i]};
-      motion.end_step(bodies, i, state(i));
+      motion.end_step(bodies, i, state(i, body));
       if (bodies.movable(i)) {
         const bool is_driven = !(bodies.force[i] == Vec3{} && bodies.torque[i] == Vec3{}) ||
                                constrained[i] == kHasDrive;
@@ -208,6 +222,17 @@ struct StepBodies {
     }
     motion.force[i] = motion.torque[i] = {};
     return rests;
+  }
+
+ private:
+  /// Motion of a body after the last sweep.
+  JFPX_HD SolverBody at_end(std::uint32_t i) const {
+    SolverBody body = solver[i];
+    hold(i, &body);
+    return body;
+  }
+  JFPX_HD BodyState state(std::uint32_t i, const SolverBody& body) const {
+    return {bodies.position[i] + body.shift, orientation[i], body.velocity, body.angular_velocity};
   }
 };
 

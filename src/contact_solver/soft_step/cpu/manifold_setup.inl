@@ -55,6 +55,14 @@ class StartedLanes {
     const Vec linear = kFixed ? mass_a : mass_a + inverse_mass(b_);
     const auto inertia_a = Mat3Lanes<S>::load(setup_.inverse_inertia, a_);
     const auto inertia_b = kFixed ? inertia_a : Mat3Lanes<S>::load(setup_.inverse_inertia, b_);
+    const auto locks_rotation = [&](const Mat3Lanes<S>& inertia) {
+      return S::either(
+          S::either(S::less_equal(inertia.row[0].x, zero), S::less_equal(inertia.row[1].y, zero)),
+          S::less_equal(inertia.row[2].z, zero));
+    };
+    const Mask is_locked = kFixed ? locks_rotation(inertia_a)
+                                  : S::either(locks_rotation(inertia_a), locks_rotation(inertia_b));
+    const Vec shared = linear * counts_;
     const auto lever = [&](const Vectors& arm_a, const Vectors& arm_b, const Vectors& u) {
       Lever result;
       result.turn_a = Vectors::cross(arm_a, u);
@@ -94,7 +102,9 @@ class StartedLanes {
       twist_impulse = S::select(is_point, twist_impulse + twist, twist_impulse);
       twist_arm = S::select(is_point, twist_arm + length * p.share, twist_arm);
       const Lever along = lever(p.arm_a, p.arm_b, normal);
-      p.store(*this, i, along, one / (linear + turning(along, along)));
+      const Vec response = linear + turning(along, along);
+      const Mask is_shared = S::both(is_locked, S::less(response, shared));
+      p.store(*this, i, along, one / S::select(is_shared, shared, response));
     }
     const Lever x = lever(centre_a, centre_b, basis.tangent);
     const Lever y = lever(centre_a, centre_b, basis.bitangent);
