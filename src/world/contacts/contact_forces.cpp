@@ -66,9 +66,9 @@ class ForcesOfContacts {
       return;
     }
     const auto& [key, normal, distance] = contacts_.spheres[contact];
-    const Real half = distance * Real(0.5);
-    force->arm_a = normal * -(bodies_.radius(key.a) + half);
-    force->arm_b = normal * (bodies_.radius(key.b) + half);
+    const Real half_overlap = distance < 0 ? distance * Real(0.5) : Real(0);  // as RowSetup
+    force->arm_a = normal * -(bodies_.radius(key.a) + half_overlap);
+    force->arm_b = normal * (bodies_.radius(key.b) + half_overlap);
   }
 
   const ContactView& contacts_;
