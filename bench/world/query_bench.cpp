@@ -1,4 +1,4 @@
-/// Benchmark of ray and overlap queries among 20,000 bodies, compared with a linear scan.
+/// Benchmark of rays, casts and overlaps among 20,000 bodies, compared with a linear scan.
 #include <jfpx/random.hpp>
 
 #include "src/scenes/scenes.hpp"
@@ -41,6 +41,7 @@ class Rays {
     const Vec3 direction = normalized(random_.uniform_in_box({-1, Real(-0.99), -1}, {1, 0, 1}));
     return {add_scaled(target, direction, -outside_), direction};
   }
+  Real outside() const { return outside_; }  ///< [m], of the origins from the targets
   Vec3 point() { return random_.uniform_in_box(room_.lower, room_.upper); }
 
  private:
@@ -74,6 +75,33 @@ void overlap(benchmark::State& state, const char* scene) {
   for (auto _ : state) benchmark::DoNotOptimize(world.overlapping(Sphere{1}, rays.point()));
 }
 
+/// The first hit of a solid that moves along a ray, to the other side of the bodies.
+void cast(benchmark::State& state, const char* scene, const SolidShape& shape) {
+  const World world = make_world(scene);
+  Rays rays(room_of(world));
+  for (auto _ : state) {
+    const Ray ray = rays.next();
+    benchmark::DoNotOptimize(
+        world.cast_shape({shape, ray.origin, {}, ray.direction * (2 * rays.outside())}));
+  }
+}
+void cast_sphere(benchmark::State& state, const char* scene) {
+  cast(state, scene, Sphere{Real(0.5)});
+}
+void cast_capsule(benchmark::State& state, const char* scene) {
+  cast(state, scene, Capsule{Real(0.4), Real(0.5)});
+}
+void cast_box(benchmark::State& state, const char* scene) { cast(state, scene, Box{}); }
+/// As the ground check of a character.
+void cast_short(benchmark::State& state, const char* scene) {
+  const World world = make_world(scene);
+  Rays rays(room_of(world));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        world.cast_shape({Sphere{Real(0.35)}, rays.point(), {}, {0, Real(-0.1), 0}}));
+  }
+}
+
 /// A ray after a change of the world, which builds the tree again.
 void ray_after_change(benchmark::State& state, const char* scene) {
   World world = make_world(scene);
@@ -95,6 +123,10 @@ void register_all() {
     add("scan", scan);
     add("ray", ray);
     add("ray_through", ray_through);
+    add("cast_sphere", cast_sphere);
+    add("cast_capsule", cast_capsule);
+    add("cast_box", cast_box);
+    add("cast_short", cast_short);
     add("overlap", overlap);
     add("ray_after_change", ray_after_change);
   }

@@ -119,6 +119,12 @@ int main() {
     std::printf("the crate's top is at %.2f m\n", static_cast<double>(hit->point.y));
   }
 
+  // How far a ball of 0.3 m can fall.
+  const std::optional<jfpx::ShapeHit> below = world.cast_shape(
+      {.shape = jfpx::Sphere{Real(0.3)}, .position = {0, 10, 0}, .translation = {0, -10, 0}},
+      is_solid);
+  if (below) std::printf("a ball falls by %.2f m\n", static_cast<double>(below->fraction * 10));
+
   for (const jfpx::BodyId id : world.overlapping(jfpx::Sphere{Real(1.5)}, {-3, 6, 3})) {
     if (id == lamp) std::printf("the lamp hangs near its hook\n");
   }

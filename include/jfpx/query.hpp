@@ -1,4 +1,4 @@
-/// Rays and their hits, for the queries of a World.
+/// Rays, moving solids and their hits, for the queries of a World.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -27,8 +27,29 @@ struct RayHit {
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
-/// Predicate that selects bodies; empty selects all. A query calls it for bodies that the ray hits,
-/// at most once for each, in unspecified order.
+/// A solid that moves along a straight line without turning.
+struct ShapeCast {
+  SolidShape shape = Sphere{};
+  Vec3 position = {};     ///< [m], of the origin of the shape at the start, within kMaxCoordinate
+  Quat orientation = {};  ///< unit quaternion
+  Vec3 translation = {};  ///< [m]; the end is within kMaxCoordinate, too; zero is allowed
+};
+
+/// Where a moving solid first touches a body. A solid that overlaps the body at the start, so that
+/// World::overlapping() finds the body, has the fraction 0, and the point, the normal and the
+/// distance of the deepest contact: moving the solid by -distance along the normal ends this
+/// contact. In all other cases the distance is 0.
+struct ShapeHit {
+  BodyId body;
+  Real fraction = 0;  ///< [-], of the translation, in [0, 1]
+  Vec3 point;         ///< [m], world
+  Vec3 normal;        ///< [-], unit, from the body to the solid
+  Real distance = 0;  ///< [m], <= 0: negative depth of an overlap at the start
+  friend bool operator==(const ShapeHit&, const ShapeHit&) = default;
+};
+
+/// Predicate that selects bodies; empty selects all. A query calls it for bodies that it hits, at
+/// most once for each, in unspecified order.
 using BodyFilter = std::function<bool(BodyId)>;
 
 }  // namespace JFPX_ABI

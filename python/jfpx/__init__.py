@@ -20,8 +20,8 @@ from ._neighbors import Neighbors, find_neighbors
 from ._recording import Recording, RecordingWriter, TrajectoryWriter
 from ._scene import Scene, scene_names
 from ._view import View
-from ._world import (BEGIN, END, STAY, ContactEvents, ContactForces, RayHit, RayHits, StepReport,
-                     World, WorldContacts)
+from ._world import (BEGIN, END, STAY, ContactEvents, ContactForces, RayHit, RayHits, ShapeHit,
+                     ShapeHits, StepReport, World, WorldContacts)
 
 __version__ = "0.3.0"
 
@@ -32,7 +32,7 @@ __all__ = [
     "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "InvalidArgument", "InvalidScene",
     "InvalidSnapshot", "JointId", "JointState", "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows",
     "PeriodicContacts", "PeriodicNearest", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
-    "RecordingWriter", "Rows", "STAY", "Scene", "SliderJoint", "SphereCollider", "Spring",
+    "RecordingWriter", "Rows", "STAY", "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring",
     "States", "StepReport", "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends",
     "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "scene_names",
 ]

@@ -218,6 +218,55 @@ class RayHits(NamedTuple):
     normal: np.ndarray
 
 
+class ShapeHit(NamedTuple):
+    """Where a moving solid first touches a body. A solid that overlaps the body at the start has the
+    fraction 0, and the point, the normal and the distance of the deepest contact.
+
+    Attributes
+    ----------
+    body : BodyId
+        The body that is hit.
+    fraction : float
+        Of the translation, in [0, 1].
+    point : three numbers
+        [m], in the axes of the world.
+    normal : three numbers
+        Unit vector, from the body to the solid.
+    distance : float
+        [m], <= 0: negative depth of an overlap at the start; otherwise 0.
+    """
+
+    body: BodyId
+    fraction: float
+    point: tuple[float, ...]
+    normal: tuple[float, ...]
+    distance: float
+
+
+class ShapeHits(NamedTuple):
+    """First hits of C casts of a solid. Floating-point arrays have the dtype of the world.
+
+    Attributes
+    ----------
+    bodies : array (C,) of int64
+        BodyId.index, as in WorldContacts; -1: no hit.
+    fraction : array (C,)
+        Of the translation, in [0, 1]; infinity: no hit.
+    point : array (C, 3)
+        [m]; zero: no hit.
+    normal : array (C, 3)
+        Unit vectors, from the body to the solid; zero: no hit.
+    distance : array (C,)
+        [m], <= 0: negative depth of an overlap at the start; otherwise 0.
+    """
+
+    bodies: np.ndarray
+    fraction: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    distance: np.ndarray
+
+
 class World:
     """Rigid bodies and their motion. The states after a step are the same to the last bit for every
     backend, algorithm and number of threads.
@@ -966,6 +1015,100 @@ class World:
         self._core.cast_rays(origins, directions, limits, *result)
         return result
 
+    def cast_shape(self, shape: dict[str, Any], position: Vector, translation: Vector,
+                   orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                   filter: Callable[[BodyId], bool] | None = None) -> ShapeHit | None:
+        """The first body that a solid touches while it moves along a line without turning, or None;
+        of bodies at the same fraction, that with the lowest index. Casts hit all bodies, also
+        sensors, whatever their collision filters.
+
+        Parameters
+        ----------
+        shape : dict
+            A solid, as the field "shape" of a body in a Scene: {"type": "capsule", "radius": 0.3,
+            "half_height": 0.6}.
+        position : three numbers
+            [m], of the origin of the shape, each in [-1e9, 1e9].
+        translation : three numbers
+            [m]; the end must be in [-1e9, 1e9], too. Zero finds overlaps only.
+        orientation : four numbers
+            Unit quaternion (w, x, y, z), to a thousandth of the squared length.
+        filter : function, optional
+            Called with the BodyId of a body that the solid hits, at most once for each; the body
+            counts if the result is true. It must not change the world.
+
+        Raises
+        ------
+        InvalidScene
+            A field of `shape` is unknown, missing or out of its range.
+        InvalidArgument
+            Another number is out of its range, or `shape` is no solid.
+        OutOfMemory, DeviceError, and exceptions of `filter`
+        """
+        hit = self._core.cast_shape(self._solid(shape), *_pose_and_translation(
+            position, translation, orientation), _of_body(filter))
+        return None if hit is None else ShapeHit(BodyId(*hit[0]), *hit[1:])
+
+    def cast_shape_through(self, shape: dict[str, Any], position: Vector, translation: Vector,
+                           orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                           filter: Callable[[BodyId], bool] | None = None) -> list[ShapeHit]:
+        """All bodies that a moving solid touches, sorted by fraction, then by index; one hit per
+        body. Parameters and exceptions are those of cast_shape()."""
+        hits = self._core.cast_shape_through(self._solid(shape), *_pose_and_translation(
+            position, translation, orientation), _of_body(filter))
+        return [ShapeHit(BodyId(*hit[0]), *hit[1:]) for hit in hits]
+
+    def cast_shapes(self, shape: dict[str, Any], positions: Any, translations: Any,
+                    orientations: Any = (1.0, 0.0, 0.0, 0.0)) -> ShapeHits:
+        """The first hits of many casts of one solid, as those of cast_shape(). Lists and arrays of
+        other numbers are converted to the dtype of the world.
+
+        Parameters
+        ----------
+        shape : dict
+            A solid, as for cast_shape().
+        positions : array (C, 3)
+            [m], each number in [-1e9, 1e9].
+        translations : array (C, 3)
+            [m]; the ends must be in [-1e9, 1e9], too.
+        orientations : four numbers or array (C, 4)
+            Unit quaternions (w, x, y, z).
+
+        Raises
+        ------
+        InvalidScene
+            A field of `shape` is unknown, missing or out of its range.
+        InvalidArgument
+            A wrong shape or type of an array, or a number out of its range; the message then has
+            the cast.
+        OutOfMemory, DeviceError
+        """
+        positions, translations = (
+            _arrays.rows(_arrays.converted(array, name, self._dtype), name, 3)
+            for array, name in ((positions, "positions"), (translations, "translations")))
+        size = positions.shape[0]
+        if translations.shape[0] != size:
+            raise InvalidArgument(
+                f"translations has {translations.shape[0]} rows; positions has {size}")
+        turned = _arrays.converted(orientations, "orientations", self._dtype)
+        if turned.ndim == 1:
+            turned = turned[np.newaxis]
+        turned = _arrays.rows(turned, "orientations", 4)
+        if turned.shape[0] not in (1, size):
+            raise InvalidArgument(f"orientations has {turned.shape[0]} rows; positions has {size}")
+        result = ShapeHits(np.empty(size, np.int64), self._values(size), self._rows(size),
+                           self._rows(size), self._values(size))
+        self._core.cast_shapes(self._solid(shape), positions, translations, turned, *result)
+        return result
+
+    def overlapping(self, shape: dict[str, Any], position: Vector,
+                    orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:
+        """Bodies that overlap or touch a solid, in the order of `bodies`. Parameters and exceptions
+        are those of cast_shape()."""
+        found = self._core.overlapping(self._solid(shape), _arrays.triple(position, "position"),
+                                       _arrays.triple(orientation, "orientation", 4))
+        return [BodyId(*body) for body in found]
+
     def overlapping_sphere(self, centre: Vector, radius: float) -> list[BodyId]:
         """Bodies that overlap or touch a sphere, in the order of `bodies`. `centre` [m] has numbers
         in [-1e9, 1e9]; `radius` [m] is in (0, 1e9]. Raises InvalidArgument for a number out of its
@@ -1002,6 +1145,10 @@ class World:
         """
         return view_of_world(self, height)
 
+    def _solid(self, shape: dict[str, Any]) -> Any:
+        """The shape in a scene of one body."""
+        return Scene({"bodies": [{"shape": shape, "mass": 0}]}, dtype=self._dtype)._scene
+
     def _rows(self, size: int) -> np.ndarray:
         return np.empty((size, 3), self._dtype)
 
@@ -1031,6 +1178,12 @@ def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:
         return None
     _arrays.function(filter, "filter")
     return lambda body: bool(filter(BodyId(*body)))
+
+
+def _pose_and_translation(position: Vector, translation: Vector,
+                          orientation: Sequence[float]) -> tuple[Any, Any, Any]:
+    return (_arrays.triple(position, "position"), _arrays.triple(translation, "translation"),
+            _arrays.triple(orientation, "orientation", 4))
 
 
 def _restored(kind: type[World], scene: Scene, options: dict[str, Any], snapshot: bytes) -> World:

@@ -78,6 +78,60 @@ nb::tuple to_python(const RayHit& hit) {
                         to_triple(hit.normal));
 }
 
+/// The shape of the only body of a scene.
+SolidShape to_solid_shape(const Scene& scene) {
+  const auto convert = [](const auto& shape) -> SolidShape {
+    using S = std::decay_t<decltype(shape)>;
+    if constexpr (std::is_constructible_v<SolidShape, const S&>) {
+      return shape;
+    } else {
+      throw InvalidArgument(
+          "the shape is no solid; it must be a sphere, a box, a capsule, a hull, a cylinder or a "
+          "cone");
+    }
+  };
+  return std::visit(convert, scene.bodies.at(0).shape);
+}
+
+ShapeCast to_cast(const Scene& shape, const Triple& position, const Triple& translation,
+                  const Quadruple& orientation) {
+  return {to_solid_shape(shape), to_vec3(position), to_quat(orientation), to_vec3(translation)};
+}
+
+nb::tuple to_python(const ShapeHit& hit) {
+  return nb::make_tuple(to_tuple(hit.body), static_cast<double>(hit.fraction), to_triple(hit.point),
+                        to_triple(hit.normal), static_cast<double>(hit.distance));
+}
+
+/// The first hit of each cast of a solid; -1 for the body of a cast without a hit.
+void cast_shapes(const PythonWorld& self, const Scene& shape, const Rows<const Real>& positions,
+                 const Rows<const Real>& translations, const Rows<const Real>& orientations,
+                 const Vector<std::int64_t>& bodies, const Vector<Real>& fractions,
+                 const Rows<Real>& points, const Rows<Real>& normals,
+                 const Vector<Real>& distances) {
+  const World& world = self.get();
+  ShapeCast cast{to_solid_shape(shape), {}, {}, {}};
+  for (std::size_t i = 0; i < bodies.shape(0); ++i) {
+    const std::size_t turned = orientations.shape(0) == 1 ? 0 : i;
+    cast.position = vec3_at(positions, i);
+    cast.translation = vec3_at(translations, i);
+    cast.orientation = {orientations(turned, 0), orientations(turned, 1), orientations(turned, 2),
+                        orientations(turned, 3)};
+    std::optional<ShapeHit> hit;
+    try {
+      hit = world.cast_shape(cast);
+    } catch (const InvalidArgument& e) {
+      throw InvalidArgument("cast " + std::to_string(i) + ": " + e.what());
+    }
+    bodies(i) = hit ? std::int64_t{hit->body.index} : -1;
+    const ShapeHit values = hit.value_or(ShapeHit{});
+    fractions(i) = hit ? values.fraction : std::numeric_limits<Real>::infinity();
+    set_row(points, i, values.point);
+    set_row(normals, i, values.normal);
+    distances(i) = values.distance;
+  }
+}
+
 /// The first hit of each ray; -1 for the body of a ray without a hit.
 void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
                const Rows<const Real>& directions, const Vector<const Real>& max_distances,
@@ -150,6 +204,36 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
           },
           nb::arg("origin"), nb::arg("direction"), nb::arg("max_distance"),
           nb::arg("filter").none())
+      .def("cast_shapes", &cast_shapes)
+      .def(
+          "cast_shape",
+          [](const PythonWorld& self, const Scene& shape, Triple position, Triple translation,
+             Quadruple orientation, const nb::object& filter) -> std::optional<nb::tuple> {
+            const auto hit = self.get().cast_shape(
+                to_cast(shape, position, translation, orientation), to_filter(filter));
+            if (!hit) return std::nullopt;
+            return to_python(*hit);
+          },
+          nb::arg("shape"), nb::arg("position"), nb::arg("translation"), nb::arg("orientation"),
+          nb::arg("filter").none())
+      .def(
+          "cast_shape_through",
+          [](const PythonWorld& self, const Scene& shape, Triple position, Triple translation,
+             Quadruple orientation, const nb::object& filter) {
+            nb::list hits;
+            for (const ShapeHit& hit : self.get().cast_shape_through(
+                     to_cast(shape, position, translation, orientation), to_filter(filter))) {
+              hits.append(to_python(hit));
+            }
+            return hits;
+          },
+          nb::arg("shape"), nb::arg("position"), nb::arg("translation"), nb::arg("orientation"),
+          nb::arg("filter").none())
+      .def("overlapping",
+           [](const PythonWorld& self, const Scene& shape, Triple position, Quadruple orientation) {
+             return to_tuples(self.get().overlapping(to_solid_shape(shape), to_vec3(position),
+                                                     to_quat(orientation)));
+           })
       .def("overlapping_sphere",
            [](const PythonWorld& self, Real radius, Triple centre) {
              return to_tuples(self.get().overlapping(Sphere{radius}, to_vec3(centre)));

@@ -1,4 +1,4 @@
-/// Rays and overlaps with triangle meshes and heightfields.
+/// Rays, overlaps and casts with triangle meshes and heightfields.
 #pragma once
 
 #include "src/collide/box_pair.hpp"
@@ -97,21 +97,25 @@ inline Real distance_to_corners(const GridView& grid, std::uint32_t tile, const 
 }
 
 /// Calls limit = visit(triangle) for each triangle of a tile that a ray may hit at a distance of at
-/// most the current limit [m]. Conservative, with the margin of TreeTraversal.
+/// most the current limit [m], or that a box may touch whose centre moves along the ray.
+/// Conservative, with the margin of TreeTraversal.
+/// @param reach [m], half extents of the box
 template <class Visit>
 Real visit_tile_along(const GridView& grid, std::uint32_t tile, const Vec3& origin,
-                      const Vec3& direction, Real limit, const Visit& visit) {
+                      const Vec3& reach, const Vec3& direction, Real limit, const Visit& visit) {
   const GridView::CellRange columns = grid.columns_of_tile(tile), rows = grid.rows_of_tile(tile);
-  const Real size = distance_to_corners(grid, tile, origin);
-  const Real margin = size * (256 * kEpsilon) + kLostLength;
+  const Real widest = std::max(reach.x, reach.z);
+  const Real size = distance_to_corners(grid, tile, origin) + widest;
+  const Real margin = size * ((widest > 0 ? 512 : 256) * kEpsilon) + kLostLength;
+  const Real margin_x = margin + reach.x, margin_z = margin + reach.z;
   // The ray is beyond the tile. The lower limit keeps the distance finite.
-  const Real far = 2 * (size + margin) /
+  const Real far = 2 * (size + widest + margin) /
                    std::max({absolute(direction.x), absolute(direction.z), kEpsilon * kEpsilon});
   for (std::uint32_t row = rows.begin; row < rows.end; ++row) {
     // The part of the ray above the row, and its interval along x.
     Real enters = 0, leaves = std::min(limit, far);
-    const Real near_z = grid.place_z(row) - margin - origin.z;
-    const Real far_z = grid.place_z(row + 1) + margin - origin.z;
+    const Real near_z = grid.place_z(row) - margin_z - origin.z;
+    const Real far_z = grid.place_z(row + 1) + margin_z - origin.z;
     if (absolute(direction.z) * far > margin) {
       const Real p = near_z / direction.z, q = far_z / direction.z;
       enters = std::max(enters, std::min(p, q));
@@ -122,7 +126,7 @@ Real visit_tile_along(const GridView& grid, std::uint32_t tile, const Vec3& orig
     if (!(enters <= leaves)) continue;
     const Real x = origin.x + direction.x * enters, end = origin.x + direction.x * leaves;
     const GridView::CellRange cells = grid.cells_between(
-        std::min(x, end) - margin, std::max(x, end) + margin, grid.columns, grid.spacing_x);
+        std::min(x, end) - margin_x, std::max(x, end) + margin_x, grid.columns, grid.spacing_x);
     const std::uint32_t last = std::min(cells.end, columns.end);
     for (std::uint32_t i = std::max(cells.begin, columns.begin); i < last; ++i) {
       const std::uint32_t first = 2 * (row * grid.columns + i);
@@ -144,8 +148,24 @@ void visit_triangles_along(const MeshView& mesh, const Vec3& origin, const Vec3&
     return;
   }
   TreeTraversal::visit_along(mesh.tree, origin, direction, limit, [&](std::uint32_t tile) {
-    return limit = visit_tile_along(mesh.grid, tile, origin, direction, limit, visit);
+    return limit = visit_tile_along(mesh.grid, tile, origin, {}, direction, limit, visit);
   });
+}
+
+/// Calls limit = visit(triangle) for each triangle that a solid may touch after it has moved by at
+/// most the current limit [m].
+/// @param centre,half_extents [m], of the bounds of the solid, in the axes of the mesh
+template <class Visit>
+void visit_triangles_swept(const MeshView& mesh, const Vec3& centre, const Vec3& half_extents,
+                           const Vec3& direction, Real limit, const Visit& visit) {
+  const auto visit_tile = [&](std::uint32_t tile) {
+    return limit = visit_tile_along(mesh.grid, tile, centre, half_extents, direction, limit, visit);
+  };
+  if (mesh.is_grid()) {
+    TreeTraversal::visit_swept(mesh.tree, centre, half_extents, direction, limit, visit_tile);
+  } else {
+    TreeTraversal::visit_swept(mesh.tree, centre, half_extents, direction, limit, visit);
+  }
 }
 
 /// The first hit of a ray up to a distance. A one-sided triangle is hit from its front only. The

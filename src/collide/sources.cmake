@@ -8,4 +8,5 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/hull/polyhedron.cpp
   ${CMAKE_CURRENT_LIST_DIR}/hull/quickhull.cpp
   ${CMAKE_CURRENT_LIST_DIR}/hull/reduction.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/shape_cast.cpp
   ${CMAKE_CURRENT_LIST_DIR}/triangle_mesh.cpp)

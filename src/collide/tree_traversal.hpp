@@ -16,6 +16,9 @@ inline namespace JFPX_ABI {
 ///   - Rays: a point at the distance t from the origin is found if it is inside the bounds with an
 ///     error of at most 300 u D. The slab test adds less than 16 u D, by its own rounding and by
 ///     the lower limit of the direction. The margin is 512 u D.
+///   - Solids that move along a line: the same with the bounds enlarged by the half extents of the
+///     solid. D is then the largest coordinate difference to the enlarged bounds, and the margin
+///     1024 u D, because the axes of both solids are rounded.
 ///   - Boxes: the margin is at least 22 sqrt(epsilon) (D + R), where R is the largest half extent
 ///     of the query.
 ///   - kLostLength exceeds all lengths that are lost because their squares are denormal.
@@ -32,7 +35,16 @@ class TreeTraversal {
   template <class Visit>
   static void visit_along(const BlockTreeView& tree, const Vec3& origin, const Vec3& direction,
                           Real limit, const Visit& visit) {
-    traverse(tree, SlabTest(origin, direction), limit, visit);
+    traverse(tree, SlabTest<false>(origin, direction, {}), limit, visit);
+  }
+
+  /// Calls limit = visit(item) for each item that a solid may touch after a distance of at most the
+  /// current limit [m], if its centre moves as above.
+  /// @param half_extents [m], of the bounds of the solid
+  template <class Visit>
+  static void visit_swept(const BlockTreeView& tree, const Vec3& centre, const Vec3& half_extents,
+                          const Vec3& direction, Real limit, const Visit& visit) {
+    traverse(tree, SlabTest<true>(centre, direction, half_extents), limit, visit);
   }
 
   /// Calls visit(item) for each item that a solid with the given bounds may touch.
@@ -49,9 +61,12 @@ class TreeTraversal {
   static constexpr std::uint32_t kWidth = TreeBlock::kWidth;
   using Lanes = std::array<Real, kWidth>;
 
-  /// Distance at which a ray enters each lane. The margin makes the test conservative; see above.
+  /// Distance at which a ray enters each lane, or at which a moving box does. The margin makes the
+  /// test conservative; see above.
+  template <bool kIsBox>
   struct SlabTest {
-    SlabTest(const Vec3& from, const Vec3& direction) : origin(from) {
+    SlabTest(const Vec3& from, const Vec3& direction, const Vec3& half)
+        : origin(from), reach(half) {
       for (int i = 0; i < 3; ++i) {
         // The lower limit keeps the reciprocal, and all products with it, finite. It moves the
         // points of a ray in a node by less than 2 D epsilon^2.
@@ -63,6 +78,7 @@ class TreeTraversal {
 
     /// @return a lane is hit if entry <= exit
     void operator()(const TreeBlock& block, Real limit, Lanes& entry, Lanes& exit) const {
+      constexpr Real kMargin = (kIsBox ? 512 : 256) * kEpsilon;
       Lanes near[3], far[3], size{};
       for (int i = 0; i < 3; ++i) {
         const Real* const first = descends[i] ? block.upper[i] : block.lower[i];
@@ -70,6 +86,10 @@ class TreeTraversal {
         for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
           near[i][lane] = first[lane] - origin[i];
           far[i][lane] = last[lane] - origin[i];
+          if constexpr (kIsBox) {
+            near[i][lane] += descends[i] ? reach[i] : -reach[i];
+            far[i][lane] += descends[i] ? -reach[i] : reach[i];
+          }
           const Real a = absolute(near[i][lane]), b = absolute(far[i][lane]);
           const Real larger = a > b ? a : b;
           size[lane] = larger > size[lane] ? larger : size[lane];
@@ -80,7 +100,7 @@ class TreeTraversal {
       for (int i = 0; i < 3; ++i) {
         const Real k = inverse[i], steepness = absolute(k);
         for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-          const Real margin = (size[lane] * (256 * kEpsilon) + detail::kLostLength) * steepness;
+          const Real margin = (size[lane] * kMargin + detail::kLostLength) * steepness;
           const Real enters = near[i][lane] * k - margin, leaves = far[i][lane] * k + margin;
           entry[lane] = enters > entry[lane] ? enters : entry[lane];
           exit[lane] = leaves < exit[lane] ? leaves : exit[lane];
@@ -88,7 +108,7 @@ class TreeTraversal {
       }
     }
 
-    Vec3 origin, inverse;
+    Vec3 origin, reach, inverse;
     bool descends[3] = {};
   };
 

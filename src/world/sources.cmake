@@ -20,7 +20,10 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/forces/step_view.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joints/joint_state.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joints/joint_store.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/queries/body_cast.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/queries/query_arguments.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/query_tree.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/queries/solid_query.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_calls.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recording.cpp

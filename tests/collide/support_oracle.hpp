@@ -46,6 +46,10 @@ class SupportSolid {
     return dot(origin_, d) + std::visit([&](const auto& s) { return reach_of(s, local); }, shape_);
   }
   const Point* axes() const { return axes_; }
+  void translate(const Point& by) {
+    origin_ = sum(origin_, by);
+    for (Point& p : points_) p = sum(p, by);
+  }
 
  private:
   static double wide(Real x) { return static_cast<double>(x); }

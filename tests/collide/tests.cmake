@@ -10,6 +10,7 @@ jfpx_add_test(collide_test INTERNAL SOURCES
   collide/hull_test.cpp
   collide/pair_oracle_test.cpp
   collide/round_contact_test.cpp
+  collide/shape_cast_test.cpp
   collide/triangle_mesh_test.cpp)
 # Has private names of the other tests.
 set_source_files_properties(collide/box_pair_test.cpp PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)

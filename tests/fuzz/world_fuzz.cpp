@@ -171,6 +171,15 @@ void query(Bytes& bytes, Twins& twins) {
   const Vec3 centre = bytes.vector(-5, 5);
   const Real size = bytes.number(Real(0.1), 3);
   twins.both([&](World& w) { return w.overlapping(Sphere{size}, centre); });
+  ShapeCast cast{.shape = Sphere{size}, .position = centre, .translation = bytes.vector(-9, 9)};
+  if (bytes.chance(Real(0.5))) cast.shape = Cone{size, size};
+  const auto first = twins.both([&](World& w) { return w.cast_shape(cast); });
+  const auto casts = twins.both([&](World& w) { return w.cast_shape_through(cast); });
+  require(first.has_value() == casts.has_value(), "both reject the cast");
+  if (casts) {
+    require(first->has_value() == !casts->empty(), "a cast that hits has a first hit");
+    require(casts->empty() || **first == casts->front(), "the first hit is the first of all hits");
+  }
   const Vec3 half = bytes.vector(Real(0.1), 3);
   twins.both([&](World& w) { return w.overlapping(Box{half}, centre, {0, 1, 0, 0}); });
 }

@@ -21,6 +21,7 @@ import jfpx
 
 BALL = {"shape": {"type": "sphere", "radius": 0.5}, "position": [0, 2, 0]}
 FLOOR = {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0}
+GROUND = {"shape": {"type": "half_space", "normal": [0, 1, 0], "offset": 0}, "mass": 0}
 FREE = {**BALL, "acceleration": [0, 0, 0]}
 
 
@@ -334,6 +335,49 @@ def test_overlaps_are_the_bodies_within_reach(rng, dtype):
     assert set(np.flatnonzero(gap < -1e-4)) <= found <= set(np.flatnonzero(gap < 1e-4))
     assert len(world.overlapping_box((2.5, 2.5, 2.5), (5, 5, 5))) == 60
     assert world.overlapping_box((100, 2.5, 2.5), (5, 5, 5)) == []
+
+
+def test_casts_agree_with_rays_to_larger_spheres(rng, dtype):
+    centres = (rng.random((40, 3)) * 10).astype(dtype)
+    worlds = []
+    for radius in (0.5, 0.75):
+        scene = jfpx.Scene(dtype=dtype)
+        scene.add_spheres(centres, radius)
+        worlds.append(jfpx.World(scene))
+    world, larger = worlds
+    starts = (rng.random((60, 3)) * 10 - [20, 0, 0]).astype(dtype)
+    translations = ((centres[rng.integers(0, 40, 60)] - starts) * 2).astype(dtype)
+    ball = {"type": "sphere", "radius": 0.25}
+    hits = world.cast_shapes(ball, starts, translations)
+    rays = larger.cast_rays(starts, translations, np.linalg.norm(translations, axis=1))
+    assert (hits.bodies == rays.bodies).mean() > 0.9 and (hits.distance == 0).all()
+    same = hits.bodies == rays.bodies
+    np.testing.assert_allclose(hits.fraction[same] * np.linalg.norm(translations, axis=1)[same],
+                               rays.distance[same], rtol=1e-3)
+    for i in range(60):
+        one = world.cast_shape(ball, starts[i], translations[i])
+        assert one.body.index == hits.bodies[i] and one.fraction == hits.fraction[i]
+        through = world.cast_shape_through(ball, starts[i], translations[i])
+        assert through[0] == one
+        others = world.cast_shape_through(ball, starts[i], translations[i],
+                                          filter=lambda body: body != one.body)
+        assert others == through[1:]
+    assert world.cast_shape(ball, (0, 0, 99), (0, 0, 1)) is None
+
+
+def test_a_cast_turns_the_solid(dtype):
+    world = jfpx.World({"bodies": [GROUND]}, dtype=dtype)
+    stick = {"type": "capsule", "radius": 0.25, "half_height": 1}
+    half = np.sqrt(0.5)
+    hits = world.cast_shapes(stick, [[0, 4, 0], [0, 4, 0], [0, 0.5, 0], [0, 4, 0]],
+                             [[0, -5, 0], [0, -5, 0], [0, 1, 0], [1, 0, 0]],
+                             [[1, 0, 0, 0], [half, half, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]])
+    np.testing.assert_allclose(hits.fraction, [0.55, 0.75, 0, np.inf], rtol=1e-5)
+    np.testing.assert_allclose(hits.distance, [0, 0, -0.75, 0], rtol=1e-5)
+    np.testing.assert_array_equal(hits.normal, [[0, 1, 0], [0, 1, 0], [0, 1, 0], [0, 0, 0]])
+    np.testing.assert_array_equal(hits.bodies, [0, 0, 0, -1])
+    assert world.overlapping(stick, (0, 1.2, 0)) == world.bodies
+    assert world.overlapping(stick, (0, 1.2, 0), (half, half, 0, 0)) == []
 
 
 def test_a_function_is_a_force(dtype):
@@ -824,6 +868,18 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((1, 3), np.float32)),
      jfpx.InvalidArgument, "directions has 1 rows"),
     (lambda w: w.overlapping_sphere((0, 0, 0), -1), jfpx.InvalidArgument, "radius"),
+    (lambda w: w.overlapping({"type": "plane", "normal": [0, 1, 0], "offset": 0}, (0, 0, 0)),
+     jfpx.InvalidArgument, "the shape is no solid"),
+    (lambda w: w.cast_shape({"type": "capsule", "radius": 0, "half_height": 1}, (0, 0, 0), (0, 0, 1)),
+     jfpx.InvalidScene, "radius"),
+    (lambda w: w.cast_shape({"type": "sphere", "radius": 1}, (0, 0, 0), (0, 0, 2e9)),
+     jfpx.InvalidArgument, "translation is"),
+    (lambda w: w.cast_shapes({"type": "sphere", "radius": 1}, [[0, 0, 0]], [[0, 0, 2e9]]),
+     jfpx.InvalidArgument, "cast 0: translation"),
+    (lambda w: w.cast_shapes({"type": "sphere", "radius": 1}, np.zeros((2, 3)), np.zeros((1, 3))),
+     jfpx.InvalidArgument, "1 rows"),
+    (lambda w: w.cast_shapes({"type": "sphere", "radius": 1}, np.zeros((3, 3)), np.zeros((3, 3)), np.ones((2, 4))),
+     jfpx.InvalidArgument, "2 rows"),
     (lambda w: w.set_states(w.states()._replace(positions=np.zeros((9, 3), np.float32))),
      jfpx.InvalidArgument, "positions has 9 rows"),
     (lambda w: w.set_states(w.positions), jfpx.InvalidArgument, "states is not a States"),

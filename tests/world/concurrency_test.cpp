@@ -25,6 +25,7 @@ struct Results {
   std::uint64_t hash = 0;
   std::vector<BodyState> states;
   std::vector<RayHit> hits;
+  std::vector<ShapeHit> casts;
   std::vector<BodyId> touched;
   std::vector<Contact> contacts;
   std::vector<ContactForce> forces;
@@ -37,6 +38,8 @@ Results query(const World& world) {
   results.hash = world.state_hash();
   world.states(&results.states);
   results.hits = world.cast_ray_through({.origin = {-9, 0, 0}, .direction = {1, 0, 0}});
+  results.casts = world.cast_shape_through(
+      {.shape = Capsule{}, .position = {-9, 0, 0}, .translation = {18, 0, 0}});
   results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
   results.contacts.assign(world.contacts().begin(), world.contacts().end());
   results.forces.assign(world.contact_forces().begin(), world.contact_forces().end());

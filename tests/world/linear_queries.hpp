@@ -1,10 +1,11 @@
-/// Ray and overlap queries by a linear scan: the reference for the tree of a World.
+/// Queries by a linear scan: the reference for the tree of a World.
 #pragma once
 
 #include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
 #include "src/collide/mesh_queries.hpp"
+#include "src/collide/shape_cast.hpp"
 #include "src/world/bodies/sub_shape_view.hpp"
 
 #include <algorithm>
@@ -43,14 +44,21 @@ class LinearQueries {
     return hits;
   }
 
-  std::vector<BodyId> overlapping(const Sphere& sphere, const Vec3& centre) const {
-    return bodies_touching(sphere, {{}, centre});
+  std::vector<ShapeHit> cast_shape_through(const ShapeCast& cast,
+                                           const BodyFilter& filter = {}) const {
+    std::vector<ShapeHit> hits;
+    for (const Body& body : bodies_) {
+      const std::optional<ShapeHit> hit = hit_of(cast, body);
+      if (hit && (!filter || filter(body.id))) hits.push_back(*hit);
+    }
+    std::ranges::stable_sort(hits, {}, &ShapeHit::fraction);
+    return hits;
   }
 
   /// @param orientation of length 1
-  std::vector<BodyId> overlapping(const Box& box, const Vec3& centre,
-                                  const Quat& orientation) const {
-    return bodies_touching(box, make_transform(normalized(orientation), centre));
+  std::vector<BodyId> overlapping(const SolidShape& shape, const Vec3& position,
+                                  const Quat& orientation = {}) const {
+    return bodies_touching(shape, make_transform(normalized(orientation), position));
   }
 
  private:
@@ -131,44 +139,134 @@ class LinearQueries {
     }
   }
 
-  static bool touches_mesh(const SolidShape& solid, const Transform& at,
-                           const detail::MeshView& mesh, const Transform& pose) {
-    bool any = false;
-    for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
-      if (!mesh.has_triangle(i)) continue;
-      detail::PairManifold manifold;
-      std::visit(
-          [&](const auto& s) {
-            find_contact_with_triangle(detail::instance(s, at), mesh, i, pose, {}, &manifold);
-          },
-          solid);
-      any |= manifold.touch_count > 0;
+  /// Calls visit(normal, point, distance) for the points where a solid touches a sub-shape.
+  template <class S, class Visit>
+  static void visit_touches(const SolidShape& solid, const Transform& at, const S& shape,
+                            const Transform& pose, const Visit& visit) {
+    Manifold found;
+    if constexpr (std::is_same_v<S, HalfSpace>) {
+      found = collide(solid, at, shape);
+    } else if constexpr (std::is_same_v<S, Plane>) {
+      found = collide(solid, at, facing_side(shape, centre_of(solid, at)));
+    } else if constexpr (detail::kIsMesh<S>) {
+      const detail::MeshView mesh = detail::view_of(shape);
+      for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+        if (!mesh.has_triangle(i)) continue;
+        detail::PairManifold manifold;
+        std::visit(
+            [&](const auto& s) {
+              find_contact_with_triangle(detail::instance(s, at), mesh, i, pose, {}, &manifold);
+            },
+            solid);
+        for (std::uint32_t k = 0; k < manifold.touch_count; ++k) {
+          visit(manifold.normal, manifold.touches[k].point, manifold.touches[k].distance);
+        }
+      }
+    } else {
+      found = collide(solid, at, SolidShape(shape), pose);
     }
-    return any;
+    for (int i = 0; i < found.count; ++i) {
+      visit(found.normal, found.points[i].point, found.points[i].distance);
+    }
+  }
+  static Vec3 centre_of(const SolidShape& solid, const Transform& at) {
+    return std::visit([&](const auto& s) { return detail::centre_of(detail::instance(s, at)); },
+                      solid);
+  }
+  static HalfSpace facing_side(const Plane& plane, const Vec3& centre) {
+    if (dot(plane.normal, centre) < plane.offset) return {-plane.normal, -plane.offset};
+    return {plane.normal, plane.offset};
+  }
+
+  /// The first entry of all sub-shapes, and of all triangles of a mesh.
+  template <class S>
+  static detail::CastEntry cast_to(const SolidShape& solid, const Transform& at,
+                                   const detail::LinearMotion& motion, const S& shape,
+                                   const Transform& pose) {
+    const auto make = [](const auto& s) { return detail::make_core(s); };
+    const detail::ConvexCore moving = std::visit(make, solid);
+    const Mat3 rotation = transposed(pose.basis) * at.basis;
+    const Vec3 from = inverse_transform_point(pose, at.origin);
+    detail::LinearMotion local = motion;
+    local.direction = inverse_transform_direction(pose, motion.direction);
+    detail::CastEntry first;
+    if constexpr (std::is_same_v<S, HalfSpace>) {
+      return detail::cast(shape, moving, at, motion);
+    } else if constexpr (std::is_same_v<S, Plane>) {
+      return detail::cast(facing_side(shape, transform_point(at, moving.centre)), moving, at,
+                          motion);
+    } else if constexpr (detail::kIsMesh<S>) {
+      const detail::MeshView mesh = detail::view_of(shape);
+      for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+        if (!mesh.has_triangle(i)) continue;
+        Vec3 corner[3];
+        mesh.get_corners(i, corner);
+        const Vec3 start = corner[0], normal = mesh.normal(i, corner);
+        for (Vec3& p : corner) p -= start;
+        const Vec3 centre = from + rotation * moving.centre;
+        if (mesh.two_sided == 0 && dot(normal, centre - start) < 0) continue;
+        detail::CastEntry entry =
+            detail::cast(detail::make_core(corner, normal), moving, rotation, from - start, local);
+        if (!entry.hit || entry.is_inside) continue;
+        entry.point += start;
+        if (!first.hit || entry.fraction < first.fraction) first = entry;
+      }
+    } else {
+      first = detail::cast(detail::make_core(shape), moving, rotation, from, local);
+    }
+    first.point = transform_point(pose, first.point);
+    first.normal = normalized(pose.basis * first.normal);
+    return first;
+  }
+
+  static std::optional<ShapeHit> hit_of(const ShapeCast& cast, const Body& body) {
+    const Transform at = make_transform(normalized(cast.orientation), cast.position);
+    std::optional<ShapeHit> deepest;
+    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+      if (!bounds_overlap(cast.shape, at, shape, pose)) return;
+      visit_touches(cast.shape, at, shape, pose,
+                    [&](const Vec3& normal, const Vec3& point, Real distance) {
+                      if (deepest && !(distance < deepest->distance)) return;
+                      deepest = ShapeHit{body.id, 0, point, normal, distance};
+                    });
+    });
+    if (deepest || cast.translation == Vec3{}) return deepest;
+    int exponent = 0;
+    const Vec3& v = cast.translation;
+    std::frexp(std::max({absolute(v.x), absolute(v.y), absolute(v.z)}), &exponent);
+    const auto mantissa = [exponent](Real x) { return std::ldexp(x, -exponent); };
+    const Real size = std::ldexp(length({mantissa(v.x), mantissa(v.y), mantissa(v.z)}), exponent);
+    const detail::LinearMotion motion{unit_direction(v), size, 1};
+    detail::CastEntry first;
+    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+      const detail::CastEntry entry = cast_to(cast.shape, at, motion, shape, pose);
+      if (entry.hit && (!first.hit || entry.fraction < first.fraction)) first = entry;
+    });
+    if (!first.hit) return std::nullopt;
+    return ShapeHit{body.id, first.fraction, first.point, first.normal, 0};
+  }
+  /// As in a World, in which parallel edges of boxes with disjoint bounds do not touch.
+  template <class S>
+  static bool bounds_overlap(const SolidShape& solid, const Transform& at, const S& shape,
+                             const Transform& pose) {
+    if constexpr (!detail::kIsWall<S>) {
+      const Vec3 half = detail::half_extents(shape, pose);
+      const Vec3 own =
+          std::visit([&](const auto& s) { return detail::half_extents(s, at); }, solid);
+      for (int i = 0; i < 3; ++i) {
+        const Real apart = absolute(pose.origin[i] - at.origin[i]), reach = half[i] + own[i];
+        if (apart > reach + 64 * kEpsilon * (apart + reach)) return false;
+      }
+    }
+    return true;
   }
 
   std::vector<BodyId> bodies_touching(const SolidShape& solid, const Transform& at) const {
-    const auto touches = [&](const auto& shape, const Transform& pose) {
-      using S = std::decay_t<decltype(shape)>;
-      if constexpr (std::is_same_v<S, HalfSpace>) {
-        return collide(solid, at, shape).count > 0;
-      } else if constexpr (std::is_same_v<S, Plane>) {
-        const bool behind = dot(shape.normal, at.origin) < shape.offset;
-        return collide(solid, at,
-                       behind ? HalfSpace{-shape.normal, -shape.offset}
-                              : HalfSpace{shape.normal, shape.offset})
-                   .count > 0;
-      } else if constexpr (detail::kIsMesh<S>) {
-        return touches_mesh(solid, at, detail::view_of(shape), pose);
-      } else {
-        return collide(solid, at, SolidShape(shape), pose).count > 0;
-      }
-    };
     std::vector<BodyId> found;
     for (const Body& body : bodies_) {
       bool any = false;
       for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
-        any = any || touches(shape, pose);
+        visit_touches(solid, at, shape, pose, [&](const Vec3&, const Vec3&, Real) { any = true; });
       });
       if (any) found.push_back(body.id);
     }

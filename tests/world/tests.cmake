@@ -51,6 +51,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/recording_test.cpp
   world/rest_test.cpp
   world/sensor_test.cpp
+  world/shape_cast_test.cpp
   world/snapshot_test.cpp
   world/vector_width_test.cpp
   world/world_test.cpp)

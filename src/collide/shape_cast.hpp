@@ -1,0 +1,89 @@
+/// Casts of solids: the first contact of a convex solid that moves along a line without turning.
+#pragma once
+
+#include "src/collide/shapes.hpp"
+
+#include <variant>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace detail {
+
+/// The core of a ball.
+struct CorePoint {};
+
+/// A convex shape in its axes: all points within `radius` of a core, which is known by its farthest
+/// points.
+struct ConvexCore {
+  std::variant<CorePoint, CoreSegment, BoxPolyhedron, HullPolyhedron, Frustum, TriangleFace> core;
+  Real radius = 0;  ///< [m]
+  Vec3 centre;      ///< [m], a point inside
+  Real reach = 0;   ///< [m], at least the distance of the farthest point from the centre
+};
+
+template <class S>
+ConvexCore make_core(const S& solid) {
+  ConvexCore core;
+  core.reach = bounding_radius(solid);
+  if constexpr (std::is_same_v<S, Sphere>) {
+    core.radius = solid.radius;
+  } else if constexpr (std::is_same_v<S, Capsule>) {
+    core.core = CoreSegment{solid.half_height};
+    core.radius = solid.radius;
+  } else if constexpr (std::is_same_v<S, Box>) {
+    core.core = BoxPolyhedron{solid.half_extents};
+  } else if constexpr (std::is_same_v<S, Hull>) {
+    const HullView& hull = solid.data().view;
+    core.core = HullPolyhedron{&hull};
+    core.centre = hull.centre;
+    core.reach += length(hull.centre) * (1 + 8 * kEpsilon);
+  } else {
+    core.core = to_frustum(solid);
+  }
+  return core;
+}
+/// A triangle, without its inside.
+/// @param corner [m], with one corner near the origin
+/// @param normal unit
+ConvexCore make_core(const Vec3 (&corner)[3], const Vec3& normal);
+
+/// A straight motion, and how much of it is of interest.
+struct LinearMotion {
+  Vec3 direction;   ///< unit, or zero for no motion
+  Real length = 0;  ///< [m]
+  Real limit = 1;   ///< [-], fraction of the motion after which contacts do not count
+};
+
+/// The first contact of a moving shape.
+struct CastEntry {
+  bool hit = false;
+  /// Whether the cores overlap at the start, by more than the rounding errors. The normal is then
+  /// an axis along which they overlap little, and the fraction is 0.
+  bool is_inside = false;
+  Real fraction = 0;  ///< [-], of the motion, in [0, 1]
+  Vec3 point;         ///< [m]
+  Vec3 normal;        ///< unit, from the target to the moving shape
+};
+
+/// Casts a shape to a target, in the axes of the target. A shape that touches the target at the
+/// start hits it only if it moves towards it.
+/// @param rotation axes of the moving shape, as columns
+/// @param offset   [m], of the moving shape at the start
+CastEntry cast(const ConvexCore& target, const ConvexCore& moving, const Mat3& rotation,
+               const Vec3& offset, const LinearMotion& motion);
+
+/// Casts a shape to a half-space, in world axes. A shape that touches the half-space at the start
+/// hits it only if it moves towards it.
+CastEntry cast(const HalfSpace& target, const ConvexCore& moving, const Transform& pose,
+               const LinearMotion& motion);
+
+/// Casts a solid to the triangles of a mesh, in world axes. A one-sided triangle is hit if the
+/// centre starts in front of it. Triangles whose insides the solid overlaps at the start are left
+/// out. Of triangles at the same fraction, the one with the lowest number is hit.
+/// @param half_extents [m], of the solid in the axes of the mesh
+CastEntry cast(const MeshView& mesh, const Transform& mesh_pose, const ConvexCore& moving,
+               const Transform& pose, const Vec3& half_extents, const LinearMotion& motion);
+
+}  // namespace detail
+}  // namespace JFPX_ABI
+}  // namespace jfpx

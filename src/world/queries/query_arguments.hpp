@@ -1,0 +1,28 @@
+/// Checks of the arguments of queries.
+#pragma once
+
+#include <jfpx/shape.hpp>
+
+#include <string>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+
+/// @throws InvalidArgument with name, value and range
+[[noreturn]] void throw_invalid_query(const char* name, const std::string& value,
+                                      const char* range);
+
+/// The pose of a solid. @throws InvalidArgument for a shape, position or orientation that is
+/// invalid for a body
+Transform checked_pose(const SolidShape& shape, const Vec3& position, const Quat& orientation);
+
+/// Direction and length of a finite vector that is not zero.
+struct ScaledLength {
+  Vec3 unit;
+  Real length = 0;
+
+  explicit ScaledLength(const Vec3& v);
+};
+
+}  // namespace JFPX_ABI
+}  // namespace jfpx
