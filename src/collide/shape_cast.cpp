@@ -209,17 +209,22 @@ class DifferenceSimplex {
 
 /// The axis of the largest separation of two cores, of which a is translated by `shift`, if they
 /// are separated. Otherwise an axis that is at least as good as the unit vector `start`.
-/// @param on_a receives the closest point of a, before its translation
-Wide widest_of_separated(const CorePair& pair, const Wide& shift, const Wide& start, Wide* on_a) {
+struct WidestAxis {
+  Wide axis;
+  Wide direction;  ///< of the closest points, which is more accurate than an axis that is as good
+  Wide on_a;       ///< [m], the closest point of a, before its translation
+};
+WidestAxis widest_of_separated(const CorePair& pair, const Wide& shift, const Wide& start) {
   constexpr int kMost = 48;
-  Wide n = start, best = start;
+  WidestAxis result{start, start, {}};
+  Wide n = start;
   double widest = 0, distance = std::numeric_limits<double>::infinity();
   DifferenceSimplex simplex;
   for (int i = 0; i < kMost; ++i) {
     const Wide of_a = pair.lowest_of_a(n), lowest = of_a - pair.highest_of_b(n) + shift;
     const double separation = dot(n, lowest);
-    if (i == 0) *on_a = of_a;
-    if (i == 0 || separation > widest) widest = separation, best = n;
+    if (i == 0) result.on_a = of_a;
+    if (i == 0 || separation > widest) widest = separation, result.axis = n;
     if (distance - widest <= pair.error() * 0.5 || simplex.contains(lowest)) break;
     DifferenceSimplex next = simplex;
     next.add({lowest, of_a});
@@ -227,10 +232,11 @@ Wide widest_of_separated(const CorePair& pair, const Wide& shift, const Wide& st
     if (!(closest < distance) || !(closest > 0)) break;
     simplex = next;
     distance = closest;
-    *on_a = simplex.on_a();
     n = simplex.closest() * (1 / closest);
+    result.on_a = simplex.on_a();
+    result.direction = n;
   }
-  return best;
+  return result;
 }
 
 /// Replaces an axis by that of the closest points. The search may end early if edges are nearly
@@ -241,13 +247,12 @@ Wide widest_of_separated(const CorePair& pair, const Wide& shift, const Wide& st
 /// @returns [m], the separation along the axis
 double find_widest(const CorePair& pair, double enough, Wide* axis) {
   constexpr int kMostRounds = 8;
-  Wide on_a;
-  *axis = widest_of_separated(pair, {}, *axis, &on_a);
+  *axis = widest_of_separated(pair, {}, *axis).axis;
   double widest = pair.separation(*axis);
   int failures = 0;
   for (int i = 0; i < kMostRounds && failures < 2 && !(widest > enough); ++i) {
     const double gap = std::max(pair.clear_gap() - widest, pair.clear_gap());
-    const Wide n = widest_of_separated(pair, i % 2 == 0 ? *axis * gap : Wide(), *axis, &on_a);
+    const Wide n = widest_of_separated(pair, i % 2 == 0 ? *axis * gap : Wide(), *axis).axis;
     const double separation = pair.separation(n);
     failures = separation > widest ? 0 : failures + 1;
     if (failures > 0) continue;
@@ -348,13 +353,15 @@ CastEntry cast(const ConvexCore& target, const ConvexCore& moving, const Mat3& r
   entry.hit = true;
   entry.fraction = has_moved ? fraction() : Real(0);
   pair.offset = base + direction * s;
-  axis = exact_axis(pair, direction, axis);
   // The closest points of touching cores are those of cores that are parted a little.
-  Wide on_core;
-  const double apart_by = std::max(pair.clear_gap() - pair.separation(axis), 0.0);
-  widest_of_separated(pair, axis * apart_by, axis, &on_core);
+  const double separation = pair.separation(axis);
+  const double parted = std::max(pair.clear_gap() - separation, 0.0);
+  const WidestAxis closest = widest_of_separated(pair, axis * parted, axis);
+  const bool is_as_wide = pair.separation(closest.direction) >= separation - pair.error();
+  if (is_as_wide && dot(closest.direction, direction) > 0) axis = closest.direction;
+  axis = exact_axis(pair, direction, axis);
   entry.normal = to_vec3(-axis);
-  entry.point = to_vec3(on_core - axis * static_cast<double>(target.radius));
+  entry.point = to_vec3(closest.on_a - axis * static_cast<double>(target.radius));
   return entry;
 }
 
