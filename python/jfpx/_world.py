@@ -126,8 +126,10 @@ class ContactForces(NamedTuple):
         BodyId.index of a and b, as in WorldContacts.
     normal : array (E, 3)
         Unit vectors from b to a.
-    arm_a, arm_b : array (E, 3)
-        [m], in the axes of the world: from the centres of mass of a and b to the point.
+    arm_a : array (E, 3)
+        [m], in the axes of the world: from the centre of mass of a to the point.
+    arm_b : array (E, 3)
+        [m]: from the centre of mass of b to the point.
     force : array (E, 3)
         [N], in the axes of the world: on a at the point, of normal force and friction; b has the
         opposite force.
