@@ -163,7 +163,7 @@ struct StepBodies {
 
   /// Ends the motion of a body along its locked axes. The rows of contacts and joints use one
   /// inverse mass for all directions. The locks thus act like a row that is solved after sweeps,
-  /// as in Box2D and Jolt. Locked rotations need nothing: the inverse inertia has them.
+  /// as in Box2D. Locked rotations need nothing: the inverse inertia has them.
   JFPX_HD void hold(std::uint32_t i, SolverBody* body) const {
     if (!bodies.any_locks) return;
     body->velocity = bodies.admitted(i, body->velocity);
