@@ -40,11 +40,11 @@ struct MotionLocks {
   friend bool operator==(const MotionLocks&, const MotionLocks&) = default;
 };
 
-/// The body does not rotate, as the character of a game.
-inline constexpr MotionLocks kFixedRotation{
-    .angular_x = true, .angular_y = true, .angular_z = true};
-/// The body moves in a plane of constant z, as the bodies of a game in two dimensions.
-inline constexpr MotionLocks kPlanarMotion{.linear_z = true, .angular_x = true, .angular_y = true};
+/// The body does not rotate, as the character of a game: the three angular axes are locked.
+inline constexpr MotionLocks kFixedRotation{false, false, false, true, true, true};
+/// The body moves in a plane of constant z, as the bodies of a game in two dimensions: linear_z,
+/// angular_x and angular_y are locked.
+inline constexpr MotionLocks kPlanarMotion{false, false, true, true, true, false};
 
 /// Definition of a rigid body in a scene. SI units.
 struct BodyDef {

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <limits>
 
 namespace jfpx {
@@ -97,10 +98,12 @@ TEST(Neighbors, ManyPointsInASkewedCellHaveThePairsOfALoop) {
 
 /// A real number that rounds to the value, within an error of long double.
 void expect_rounded(Real value, Long exact, Long magnitude) {
-  const Long neighbor = std::nextafter(value, std::numeric_limits<Real>::infinity());
-  const Long unit = neighbor - static_cast<Long>(value);
+  // Away from 0: a power of two has a neighbor at half of the distance on the other side.
+  const Real away = std::copysign(std::numeric_limits<Real>::infinity(), value);
+  const Long unit = std::abs(static_cast<Long>(std::nextafter(value, away)) - value);
   const Long error = std::numeric_limits<Long>::epsilon() * 16 * magnitude;
-  EXPECT_LE(std::abs(static_cast<Long>(value) - exact), unit / 2 + error);
+  EXPECT_LE(std::abs(static_cast<Long>(value) - exact), unit / 2 + error)
+      << std::setprecision(25) << value << " of " << exact << ", unit " << unit;
 }
 
 TEST(Neighbors, VectorsAreThoseOfTheGivenPoints) {
