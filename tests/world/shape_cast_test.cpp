@@ -217,24 +217,24 @@ TEST(CastShape, AgainstAnEdgeHasTheNormalBetweenBothFaces) {
 }
 
 TEST(CastShape, FarFromTheOriginAndFromTheTargetIsAsAccurateAsTheCoordinates) {
-  for (const Real far : {1e3_r, 1e5_r, 1e7_r}) {
-    const Vec3 centre{far, -far, far};
+  for (const Real away : {1e3_r, 1e5_r, 1e7_r}) {
+    const Vec3 centre{away, -away, away};
     const World world = cast_world({fixed_body(Box{{4, 1, 4}}, centre)});
     // At most the error of a coordinate.
-    const Real error = 2 * far * kEpsilon;
+    const Real error = 2 * away * kEpsilon;
     const auto hit = world.cast_shape({Sphere{0.5_r}, centre + Vec3{0, 16, 0}, {}, {0, -32, 0}});
-    ASSERT_TRUE(hit) << far;
-    EXPECT_NEAR(hit->fraction * 32, 14.5_r, error + 4 * kCastTolerance) << far;
+    ASSERT_TRUE(hit) << away;
+    EXPECT_NEAR(hit->fraction * 32, 14.5_r, error + 4 * kCastTolerance) << away;
     // A long way to a small body.
     const World small = cast_world({fixed_body(Sphere{1}, {})});
     const auto passes = [&](Real beside) {
-      return !small.cast_shape({Sphere{1}, {-far, beside, 0}, {}, {2 * far, 0, 0}});
+      return !small.cast_shape({Sphere{1}, {-away, beside, 0}, {}, {2 * away, 0, 0}});
     };
-    EXPECT_FALSE(passes(1.99_r)) << far;
-    EXPECT_TRUE(passes(2.01_r)) << far;
-    const auto first = small.cast_shape({Sphere{1}, {-far, 0, 0}, {}, {2 * far, 0, 0}});
+    EXPECT_FALSE(passes(1.99_r)) << away;
+    EXPECT_TRUE(passes(2.01_r)) << away;
+    const auto first = small.cast_shape({Sphere{1}, {-away, 0, 0}, {}, {2 * away, 0, 0}});
     ASSERT_TRUE(first);
-    EXPECT_NEAR(first->fraction, (far - 2) / (2 * far), kEpsilon) << far;
+    EXPECT_NEAR(first->fraction, (away - 2) / (2 * away), kEpsilon) << away;
   }
 }
 
