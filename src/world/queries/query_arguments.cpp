@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -18,10 +19,11 @@ void throw_invalid_query(const char* name, const std::string& value, const char*
 }
 
 Transform checked_pose(const SolidShape& shape, const Vec3& position, const Quat& orientation) {
-  const auto check = [&]<class S>(const S& solid) {
+  const auto check = [&](const auto& solid) {
     std::string fault = find_field_fault(solid);
     if (fault.empty()) fault = find_fault(BodyState{position, orientation, {}, {}});
-    if (!fault.empty()) throw InvalidArgument(detail::kShapeName<S> + (" " + fault));
+    if (!fault.empty())
+      throw InvalidArgument(detail::kShapeName<std::decay_t<decltype(solid)>> + (" " + fault));
   };
   std::visit(check, shape);
   return make_transform(normalized(orientation), position);
