@@ -208,7 +208,7 @@ TEST(ShapeCast, OfTinyAndHugeShapesAreThoseOfUsualOnes) {
     // The volume of a hull must not underflow.
     const int most = has_hull ? 20 : sizeof(Real) == 4 ? 50 : 90;
     const detail::CastEntry usual = scene.cast();
-    const auto power = static_cast<int>(random.below(most + 26)) - most;
+    const auto power = static_cast<int>(random.below(static_cast<std::uint64_t>(most) + 26)) - most;
     const Real factor = std::ldexp(Real(1), power);
     scene.target_shape = scaled_by(scene.target_shape, factor);
     scene.target =
