@@ -31,10 +31,14 @@ BodyDef floating(const Shape& shape, const Vec3& position, const MotionLocks& lo
   return def;
 }
 
-using Matrix = std::array<std::array<double, 3>, 3>;
+struct Matrix {
+  double rows[3][3];
+  double* operator[](int i) { return rows[i]; }
+  const double* operator[](int i) const { return rows[i]; }
+};
 
 Matrix to_double(const Mat3& m) {
-  Matrix result;
+  Matrix result{};
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) result[i][k] = static_cast<double>(m(i, k));
   }
@@ -61,7 +65,9 @@ Matrix world_inertia(const World& world, BodyId id) {
 }
 
 /// Expects that an inverse inertia is the inverse of the free rows and columns of an inertia.
-void expect_inverse(const Mat3& inverse, const Matrix& inertia, const std::array<bool, 3>& locked) {
+void expect_inverse(const Mat3& inverse, const Matrix& inertia,
+                    const std::array<bool, 3>& locked_axes) {
+  const bool* const locked = locked_axes.data();
   const Matrix j = to_double(inverse);
   double largest = 0;
   for (int i = 0; i < 3; ++i) largest = std::max(largest, j[i][i]);
