@@ -51,8 +51,8 @@ void prefetch_algorithm(const ConvexDispatch& dispatch, std::size_t i);
 
 /// Updates the manifold of pair i on the calling thread, if neither other pairs nor user code can
 /// observe the update: the algorithm and both shapes must be exactly classes of Bullet whose
-/// functions only read the bodies and write the manifold of the pair. Spheres with boxes and planes
-/// are computed without Bullet's algorithm.
+/// functions only read the bodies and write the manifold of the pair. Spheres with planes, and the
+/// pairs of find_closest_points(), are computed without Bullet's algorithm.
 /// @return false if Bullet must process the pair
 bool commit_convex(const ConvexDispatch& dispatch, std::size_t i, CommitCounts* counts);
 

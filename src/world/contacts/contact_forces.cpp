@@ -1,13 +1,11 @@
 /// Forces of contact points from their impulses; see the header.
 #include "src/world/contacts/contact_forces.hpp"
 
-#include "src/base/parallel_for.hpp"
-#include "src/base/reserve.hpp"
+#include "src/base/parallel_append.hpp"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -81,26 +79,15 @@ class ForcesOfContacts {
 void make_contact_forces(const ContactView& contacts, Real inverse_h, const BodyStore& bodies,
                          ThreadPool* pool, std::vector<ContactForce>* forces) {
   const ForcesOfContacts from(contacts, inverse_h, bodies);
-  const std::size_t chunks =
-      (contacts.size() + kContactsPerForceChunk - 1) / kContactsPerForceChunk;
-  std::vector<std::size_t> begin(chunks + 1);
-  const auto for_each_chunk = [&](const auto& visit) {
-    parallel_for(pool, contacts.size(), kContactsPerForceChunk,
-                 [&](std::size_t first, std::size_t last) {
-                   visit(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
-                 });
-  };
-  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
-    std::size_t count = 0;
-    for (std::uint32_t i = first; i < last; ++i) count += from.count(i);
-    begin[first / kContactsPerForceChunk] = count;
-  });
-  std::exclusive_scan(begin.begin(), begin.end(), begin.begin(), std::size_t{0});
-  resize_geometric(forces, begin[chunks]);
-  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
-    ContactForce* next = forces->data() + begin[first / kContactsPerForceChunk];
-    for (std::uint32_t i = first; i < last; ++i) next = from.write(i, next);
-  });
+  std::vector<std::size_t> begin;
+  forces->clear();
+  parallel_append(
+      pool, contacts.size(), kContactsPerForceChunk,
+      [&](std::size_t i) { return std::size_t{from.count(static_cast<std::uint32_t>(i))}; },
+      [&](std::size_t i, ContactForce* next) {
+        return from.write(static_cast<std::uint32_t>(i), next);
+      },
+      &begin, forces);
 }
 
 }  // namespace JFPX_ABI

@@ -3,12 +3,11 @@
 
 #include <jfpx/contact.hpp>
 
+#include "src/base/parallel_append.hpp"
 #include "src/base/parallel_for.hpp"
-#include "src/base/reserve.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/contacts/merge_contacts.hpp"
 
-#include <numeric>
 #include <span>
 
 namespace jfpx {
@@ -58,39 +57,25 @@ BegunCounts count_begun_contacts(const ContactView& contacts, ThreadPool* pool) 
 void ContactListMaker::append_spheres(const DetectedContacts& detected, const ContactView& contacts,
                                       bool with_begun, const BodiesOfStep& bodies,
                                       std::vector<Contact>* list) {
-  const std::size_t chunks =
-      (contacts.sphere_count + kContactsPerListChunk - 1) / kContactsPerListChunk;
-  assign_geometric(&begin_, chunks + 1, 0);
   const auto touches = [&](std::uint32_t i) { return contacts.distance(i, 0) <= 0; };
-  const auto is_listed = [&](std::uint32_t i) {
-    return touches(i) || (with_begun && soft_step::has_begun(contacts, i, 0));
+  const auto count_of = [&](std::size_t item) -> std::size_t {
+    const auto i = static_cast<std::uint32_t>(item);
+    return touches(i) || (with_begun && soft_step::has_begun(contacts, i, 0)) ? 1 : 0;
   };
-  const auto for_each_chunk = [&](const auto& visit) {
-    parallel_for(pool_, contacts.sphere_count, kContactsPerListChunk,
-                 [&](std::size_t first, std::size_t last) {
-                   visit(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last));
-                 });
+  const auto write = [&](std::size_t item, Contact* next) {
+    if (count_of(item) == 0) return next;
+    const auto i = static_cast<std::uint32_t>(item);
+    const auto& [key, normal, distance] = contacts.spheres[i];
+    const ListedBody a = bodies[key.a], b = bodies[key.b];
+    const SphereInstance sphere_b{detected.position[key.b], b.radius};
+    const bool touch = touches(i);
+    const Vec3 point =
+        touch ? middle_point(normal, distance, sphere_b) : point_on_b(normal, sphere_b);
+    *next++ = {a.id, b.id, normal, point, touch ? distance : Real(0)};
+    return next;
   };
-  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
-    std::size_t count = 0;
-    for (std::uint32_t i = first; i < last; ++i) count += is_listed(i) ? 1 : 0;
-    begin_[first / kContactsPerListChunk] = count;
-  });
-  std::exclusive_scan(begin_.begin(), begin_.end(), begin_.begin(), list->size());
-  resize_geometric(list, begin_[chunks]);
-  for_each_chunk([&](std::uint32_t first, std::uint32_t last) {
-    Contact* next = list->data() + begin_[first / kContactsPerListChunk];
-    for (std::uint32_t i = first; i < last; ++i) {
-      if (!is_listed(i)) continue;
-      const auto& [key, normal, distance] = contacts.spheres[i];
-      const ListedBody a = bodies[key.a], b = bodies[key.b];
-      const SphereInstance sphere_b{detected.position[key.b], b.radius};
-      const bool touch = touches(i);
-      const Vec3 point =
-          touch ? middle_point(normal, distance, sphere_b) : point_on_b(normal, sphere_b);
-      *next++ = {a.id, b.id, normal, point, touch ? distance : Real(0)};
-    }
-  });
+  parallel_append(pool_, contacts.sphere_count, kContactsPerListChunk, count_of, write, &begin_,
+                  list);
 }
 
 void ContactListMaker::make(const DetectedContacts& detected, const ContactView& contacts,
