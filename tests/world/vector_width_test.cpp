@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <variant>
+
 namespace jfpx {
 namespace {
 
@@ -51,13 +53,26 @@ Scene random_bodies(Random* random, bool any_boxes) {
   return scene;
 }
 
-// The snapshots contain the impulses of contacts.
+/// Adds joints of all types, and ball joints that only hold two points together, which have vectors
+/// of their own.
+void add_joints(Random* random, Scene* scene) {
+  test::add_random_joints(random, scene);
+  for (Joint& joint : scene->joints) {
+    auto* ball = std::get_if<BallJoint>(&joint);
+    if (ball == nullptr || random->below(2) == 0) continue;
+    joint = BallJoint{
+        .a = ball->a, .b = ball->b, .anchor_a = ball->anchor_a, .anchor_b = ball->anchor_b};
+  }
+}
+
+// The snapshots contain the impulses of contacts and joints.
 TEST(VectorWidths, HaveEqualSnapshotsOfRandomBodies) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
-  for (int k = 0; k < 30; ++k) {
-    const Scene scene = random_bodies(&random, k % 2 == 1);
+  for (int k = 0; k < 45; ++k) {
+    Scene scene = random_bodies(&random, k % 3 != 0);
+    if (k % 3 == 2) add_joints(&random, &scene);
     World scalar(scene, {.collider = {.backend = Backend::cpu, .simd = SimdLevel::scalar}});
     World vectors(scene, {.collider = {.backend = Backend::cpu, .simd = SimdLevel::automatic}});
     const std::span<const BodyId> ids = scalar.bodies();

@@ -8,48 +8,6 @@ inline namespace JFPX_ABI {
 namespace cpu {
 namespace {
 
-template <class S>
-struct OrientationLanes {
-  using Vec = typename S::Vec;
-  static constexpr std::size_t kStride = 4;
-  Vec w;
-  Vec3Lanes<S> v;
-
-  static OrientationLanes load(const Real* all, const std::uint32_t* items) {
-    const auto quad = QuadLanes<S>::load(all, kStride, items);
-    return {quad.vector.x, {quad.vector.y, quad.vector.z, quad.scalar}};
-  }
-  void store(Real* all, const std::uint32_t* items, unsigned lanes) const {
-    QuadLanes<S>{{w, v.x, v.y}, v.z}.store(all, kStride, items, lanes);
-  }
-
-  /// add_scaled(q, omega, scale) for a Quat.
-  OrientationLanes add_scaled(const Vec3Lanes<S>& omega, Vec scale) const {
-    const Vec3Lanes<S> r = omega * scale;
-    const Vec zero = S::set(0), half = S::set(Real(0.5));
-    const Vec tw = zero * w - r.x * v.x - r.y * v.y - r.z * v.z;
-    const Vec tx = zero * v.x + r.x * w + r.y * v.z - r.z * v.y;
-    const Vec ty = zero * v.y - r.x * v.z + r.y * w + r.z * v.x;
-    const Vec tz = zero * v.z + r.x * v.y - r.y * v.x + r.z * w;
-    return {w + tw * half, {v.x + tx * half, v.y + ty * half, v.z + tz * half}};
-  }
-  OrientationLanes normalized(Vec shortest2) const {
-    const Vec one = S::set(1), zero = S::set(0);
-    const Vec n2 = w * w + v.x * v.x + v.y * v.y + v.z * v.z;
-    const typename S::Mask is_long = S::less(shortest2, n2);
-    const Vec k = one / S::square_root(n2);
-    return {S::select(is_long, w * k, one),
-            Vec3Lanes<S>::select(is_long, v * k, {zero, zero, zero})};
-  }
-  /// One bit per lane: whether all components are 0.
-  unsigned are_zero() const {
-    const Vec zero = S::set(0);
-    const auto differs = S::either(S::either(S::differs(w, zero), S::differs(v.x, zero)),
-                                   S::either(S::differs(v.y, zero), S::differs(v.z, zero)));
-    return ~S::bits(differs);
-  }
-};
-
 /// @param items   numbers of the bodies, kLanes
 /// @param changed lanes to be stored
 template <class S>
@@ -69,19 +27,6 @@ void move_lanes(const BodySweep& sweep, const std::uint32_t* items, unsigned cha
       .normalized(S::set(sweep.shortest2))
       .store(sweep.orientations, items, changed & ~before.are_zero());
   advance(solver_body_quad::kRotation, turning);
-}
-
-/// to_matrix(q)
-template <class S>
-Mat3Lanes<S> to_matrix(const OrientationLanes<S>& q) {
-  const auto one = S::set(1);
-  const auto x2 = q.v.x + q.v.x, y2 = q.v.y + q.v.y, z2 = q.v.z + q.v.z;
-  const auto xx = q.v.x * x2, yy = q.v.y * y2, zz = q.v.z * z2;
-  const auto xy = q.v.x * y2, xz = q.v.x * z2, yz = q.v.y * z2;
-  const auto wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
-  return {{{one - (yy + zz), xy - wz, xz + wy},
-           {xy + wz, one - (xx + zz), yz - wx},
-           {xz - wy, yz + wx, one - (xx + yy)}}};
 }
 
 /// BodyView::turn_gyroscopically() of slow rotations.

@@ -40,9 +40,6 @@ inline constexpr std::size_t kSpinA = 8;   ///< spin a, normal impulse
 inline constexpr std::size_t kSpinB = 12;  ///< spin b, rebound
 }  // namespace point_row_quad
 
-/// Rows of a bundle.
-inline constexpr std::size_t kBundle = 32 / sizeof(Real);
-
 /// Vectors of the rows of a bundle. A lever has 12 vectors: see soft_step::Lever.
 namespace bundle_vector {
 inline constexpr std::size_t kNormal = 0;

@@ -261,36 +261,26 @@ class ManifoldLanes {
 
 /// Calls one(lanes) for all bundles of the rows [first, last). @returns as ManifoldSweepFunction
 template <class S, bool kFixed, class One>
-std::size_t for_each_bundle(const ManifoldSweep& sweep, std::size_t first, std::size_t last,
-                            std::uint32_t* left, const One& one) {
-  constexpr unsigned kAll = (1u << kBundle) - 1;
-  std::size_t skipped = 0;
-  for (std::size_t bundle = first / kBundle; bundle * kBundle < last; ++bundle) {
-    const std::size_t begin = bundle * kBundle;
-    unsigned lanes = kAll;
-    if (begin < first) lanes &= kAll << (first - begin);
-    if (last - begin < kBundle) lanes &= (1u << (last - begin)) - 1;
+std::size_t for_each_manifold_bundle(const ManifoldSweep& sweep, std::size_t first,
+                                     std::size_t last, std::uint32_t* left, const One& one) {
+  return for_each_bundle(first, last, left, [&](std::size_t bundle, unsigned lanes) {
     ManifoldLanes<S, kFixed> rows(sweep, bundle, lanes);
-    for (unsigned bits = one(&rows); bits != 0; bits &= bits - 1) {
-      left[skipped++] =
-          static_cast<std::uint32_t>(begin) + static_cast<unsigned>(__builtin_ctz(bits));
-    }
-  }
-  return skipped;
+    return one(&rows);
+  });
 }
 
 template <class S, bool kFixed>
 std::size_t warm_start_manifolds(const ManifoldSweep& sweep, std::size_t first, std::size_t last,
                                  std::uint32_t* left) {
-  return for_each_bundle<S, kFixed>(sweep, first, last, left,
-                                    [](auto* rows) { return rows->warm_start(); });
+  return for_each_manifold_bundle<S, kFixed>(sweep, first, last, left,
+                                             [](auto* rows) { return rows->warm_start(); });
 }
 
 template <class S, bool kFixed, bool kUseBias>
 std::size_t solve_manifolds(const ManifoldSweep& sweep, std::size_t first, std::size_t last,
                             std::uint32_t* left) {
-  return for_each_bundle<S, kFixed>(sweep, first, last, left,
-                                    [](auto* rows) { return rows->template solve<kUseBias>(); });
+  return for_each_manifold_bundle<S, kFixed>(
+      sweep, first, last, left, [](auto* rows) { return rows->template solve<kUseBias>(); });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "src/base/parallel_for.hpp"
 #include "src/base/prefetch.hpp"
 #include "src/base/reserve.hpp"
+#include "src/contact_solver/soft_step/cpu/frame_bundles.hpp"
 #include "src/contact_solver/soft_step/row_operations.hpp"
 
 #include <algorithm>
@@ -102,6 +103,13 @@ cpu::SweepSoftness softness(const Softness& s) {
   return {s.bias_rate, s.mass_scale, s.impulse_scale};
 }
 
+/// The lane of a row of a joint.
+[[maybe_unused]] FrameLane frame_lane(const cpu::FrameSweep& sweep, std::size_t row) {
+  const std::size_t bundle = row / cpu::kBundle;
+  return {&sweep.numbers[bundle], sweep.rows + bundle * (cpu::frame_vector::kCount * cpu::kBundle),
+          static_cast<unsigned>(row % cpu::kBundle)};
+}
+
 /// Whether a sweep solves rows of a type.
 template <class Row>
 bool takes_part(Sweep sweep) {
@@ -113,7 +121,7 @@ bool takes_part(Sweep sweep) {
 template <class Kernels>
 auto function_of(const Kernels& kernels, Sweep sweep) {
   if (sweep == Sweep::warm_start) return kernels.warm_start;
-  return kernels.solve[sweep == Sweep::bias ? 1 : 0];
+  return kernels.solve[sweep == Sweep::relax ? 0 : 1];
 }
 
 }  // namespace
@@ -388,6 +396,7 @@ std::uint32_t SoftStepSolver::fill(RowKind kind, std::uint32_t contact, Place* p
       if (any_rebounds(row, all.parts_of(row))) any_rebound_.store(true, std::memory_order_relaxed);
     } else {
       setup_.fill<kFixed>(&row, all.parts_of(row), contact);
+      if constexpr (std::is_same_v<Row, FrameRow>) frame_used_[number] = 1;
     }
   });
   count(contact, place);
@@ -418,6 +427,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   for_parts(shape_.fixed_parts, [this](std::size_t part) { place_fixed_rows(part); });
   place_overflow();
   complete_manifolds();
+  pack_frames();
 }
 
 /// Counts the rows, and reserves memory for them.
@@ -440,6 +450,7 @@ void SoftStepSolver::allocate_rows() {
     }
   });
   assign_geometric(&manifold_counts_, rows<ManifoldRow>().table.size(), cpu::kNoManifold);
+  assign_geometric(&frame_used_, rows<FrameRow>().table.size(), 0);
 }
 
 cpu::ManifoldSetup SoftStepSolver::manifold_setup() {
@@ -454,6 +465,20 @@ cpu::ManifoldSetup SoftStepSolver::manifold_setup() {
           .inverse_friction_gap = setup_.inverse_friction_gap,
           .least_weight = kLeastWeight,
           .least_determinant = kLeastDeterminant};
+}
+
+/// Calls f(is_fixed, first, last) for parts of the aligned rows [first, last): those with and
+/// without fixed bodies.
+template <class F>
+void SoftStepSolver::for_fixed_and_others(const RowTable& table, std::size_t first,
+                                          std::size_t last, const F& f) {
+  const std::size_t fixed = table.begin(table.fixed(0)), overflow = table.begin(table.overflow());
+  const auto call = [&](bool is_fixed, std::size_t begin, std::size_t end) {
+    if (begin < end) f(is_fixed, begin, end);
+  };
+  call(false, first, std::min(last, fixed));
+  call(true, std::max(first, fixed), std::min(last, overflow));
+  call(false, std::max(first, overflow), last);
 }
 
 /// Completes the rows of manifolds, and writes their bundles.
@@ -480,15 +505,12 @@ void SoftStepSolver::complete_manifolds() {
   bundle_points_.reserve_geometric(std::size_t{points} * (cpu::bundle_point::kCount * cpu::kBundle),
                                    kWhat);
   const cpu::ManifoldSetup setup = manifold_setup();
-  const std::size_t fixed = table.begin(table.fixed(0)) / cpu::kBundle;
-  const std::size_t overflow = table.begin(table.overflow()) / cpu::kBundle;
-  const auto complete = [&](bool is_fixed, std::size_t first, std::size_t last) {
-    if (first < last) cpu::kAvx2ManifoldSweep[is_fixed ? 1 : 0].complete(setup, first, last);
-  };
   parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
-    complete(false, first, std::min(last, fixed));
-    complete(true, std::max(first, fixed), std::min(last, overflow));
-    complete(false, std::max(first, overflow), last);
+    for_fixed_and_others(table, first * cpu::kBundle, last * cpu::kBundle,
+                         [&](bool is_fixed, std::size_t begin, std::size_t end) {
+                           cpu::kAvx2ManifoldSweep[is_fixed ? 1 : 0].complete(
+                               setup, begin / cpu::kBundle, end / cpu::kBundle);
+                         });
   });
   is_packed_ = true;
 #endif
@@ -503,6 +525,64 @@ void SoftStepSolver::unpack_manifolds() {
   parallel_for(
       pool_, rows<ManifoldRow>().table.size() / cpu::kBundle, kBundlesPerChunk,
       [&](std::size_t first, std::size_t last) { cpu::kAvx2UnpackManifolds(setup, first, last); });
+#endif
+}
+
+/// Writes a bundle of joints with frames.
+void SoftStepSolver::pack_bundle(const cpu::FrameSweep& sweep, std::size_t bundle) {
+  const std::size_t begin = bundle * cpu::kBundle;
+  const auto for_lanes = [&](const auto& f) {
+    for (std::size_t i = begin; i < begin + cpu::kBundle; ++i) {
+      const bool is_used = frame_used_[i] != 0;
+      f(frame_lane(sweep, i), rows<FrameRow>().rows[is_used ? i : begin], is_used);
+    }
+  };
+  sweep.numbers[bundle] = {};
+  for_lanes(
+      [](const FrameLane& lane, const FrameRow& row, bool is_used) { lane.pack(row, is_used); });
+  if (sweep.numbers[bundle].has_axes == 0) return;
+  for_lanes([this](const FrameLane& lane, const FrameRow& row, bool) {
+    lane.pack_axes(row, constants_);
+  });
+}
+
+/// Writes the bundles of joints with frames.
+void SoftStepSolver::pack_frames() {
+#if defined(__x86_64__)
+  if (!uses_avx2_) return;
+  const Rows<FrameRow>& all = rows<FrameRow>();
+  const std::size_t bundles = all.table.size() / cpu::kBundle;
+  frame_numbers_.reserve_geometric(bundles, "rows of joints");
+  frame_bundles_.reserve_geometric(bundles * (cpu::frame_vector::kCount * cpu::kBundle),
+                                   "rows of joints");
+  const cpu::FrameSweep sweep = frame_sweep();
+  parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
+    for (std::size_t bundle = first; bundle < last; ++bundle) pack_bundle(sweep, bundle);
+    const auto start = [&](bool is_fixed, std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; i += kRowsPerKernel) {
+        std::array<std::uint32_t, kRowsPerKernel> left;
+        cpu::kAvx2FrameSweep[is_fixed ? 1 : 0].start(sweep, i, std::min(i + kRowsPerKernel, end),
+                                                     left.data());
+      }
+    };
+    for_fixed_and_others(all.table, first * cpu::kBundle, last * cpu::kBundle, start);
+  });
+#endif
+}
+
+/// Writes the impulses of the bundles to the rows.
+void SoftStepSolver::unpack_frames() {
+#if defined(__x86_64__)
+  if (!uses_avx2_) return;
+  Rows<FrameRow>& all = rows<FrameRow>();
+  const cpu::FrameSweep sweep = frame_sweep();
+  parallel_for(pool_, all.table.size(), kContactsPerChunk,
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t i = first; i < last; ++i) {
+                   if (frame_used_[i] == 0 || !has_lane(all.rows[i].parameters)) continue;
+                   frame_lane(sweep, i).unpack_impulses(&all.rows[i]);
+                 }
+               });
 #endif
 }
 
@@ -579,6 +659,10 @@ std::size_t SoftStepSolver::run_kernel([[maybe_unused]] Sweep sweep,
   if constexpr (std::is_same_v<Row, ManifoldRow>) {
     const auto kernel = function_of(cpu::kAvx2ManifoldSweep[kFixed ? 1 : 0], sweep);
     return kernel(manifold_sweep(kFixed), first, last, left);
+  } else if constexpr (std::is_same_v<Row, FrameRow>) {
+    cpu::FrameSweep frames = frame_sweep();
+    frames.starts = sweep == Sweep::first_joints;
+    return function_of(cpu::kAvx2FrameSweep[kFixed ? 1 : 0], sweep)(frames, first, last, left);
   } else {
     return function_of(cpu::kAvx2SphereSweep, sweep)(sphere_sweep(), first, last, left);
   }
@@ -593,8 +677,7 @@ void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t la
                               const Operation& operation) {
   using IsFixed = std::bool_constant<kFixed>;
   if (!takes_part<Row>(sweep)) return;
-  constexpr bool kHasKernel =
-      std::is_same_v<Row, ManifoldRow> || (std::is_same_v<Row, SphereRow> && !kFixed);
+  constexpr bool kHasKernel = kHasBundles<Row> || (std::is_same_v<Row, SphereRow> && !kFixed);
   if constexpr (kHasKernel) {
     if (uses_avx2_ && sweep != Sweep::restitution) {
       for (std::size_t begin = first, end = 0; begin < last; begin = end) {
@@ -703,14 +786,36 @@ cpu::SphereSweep SoftStepSolver::sphere_sweep() {
           kDeepPenetration};
 }
 
+cpu::FrameSweep SoftStepSolver::frame_sweep() {
+  const StepConstants& c = constants_;
+  const BodyProperties& properties = setup_.properties;
+  return {.numbers = frame_numbers_.data(),
+          .rows = frame_bundles_.data(),
+          .bodies = reinterpret_cast<Real*>(bodies_.data()),
+          .orientation = reinterpret_cast<const Real*>(properties.orientation),
+          .start_orientation = reinterpret_cast<const Real*>(properties.start_orientation),
+          .inverse_inertia = reinterpret_cast<const Real*>(properties.inverse_inertia),
+          .h = c.h,
+          .inverse_h = c.inverse_h,
+          .correction = kJointCorrection,
+          .most_correction = most_correction(c),
+          .most_turn = kMostTurn,
+          .epsilon = kEpsilon,
+          .starts = false};
+}
+
 void SoftStepSolver::store() {
   unpack_manifolds();
+  unpack_frames();
   for_all_kinds([this]<class Row>(Rows<Row>* rows) {
     parallel_for(pool_, rows->table.size(), kContactsPerChunk,
                  [&](std::size_t first, std::size_t last) {
                    for (std::size_t i = first; i < last; ++i) {
                      if constexpr (std::is_same_v<Row, ManifoldRow>) {
                        if (manifold_counts_[i] == cpu::kNoManifold) continue;
+                     }
+                     if constexpr (std::is_same_v<Row, FrameRow>) {
+                       if (frame_used_[i] == 0) continue;
                      }
                      const auto& row = rows->rows[i];
                      setup_.store(row, rows->parts_of(row), rows->contacts[i]);

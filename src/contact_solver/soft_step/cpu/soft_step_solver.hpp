@@ -7,6 +7,7 @@
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/cpu/body_blocks.hpp"
 #include "src/contact_solver/soft_step/cpu/body_sweep.hpp"
+#include "src/contact_solver/soft_step/cpu/frame_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/manifold_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/row_table.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
@@ -80,6 +81,10 @@ class SoftStepSolver {
   struct Place {
     std::uint32_t row = 0, point = 0;
   };
+  /// Whether rows are solved in bundles.
+  template <class Row>
+  static constexpr bool kHasBundles =
+      std::is_same_v<Row, ManifoldRow> || std::is_same_v<Row, FrameRow>;
   /// The rows of a kind.
   template <class RowOfKind>
   struct Rows {
@@ -92,7 +97,7 @@ class SoftStepSolver {
     RowTable part_table;  ///< of `parts`, with the cells of `table`
 
     void start(const RowTable::Shape& shape) {
-      table.start(shape, std::is_same_v<Row, ManifoldRow> ? cpu::kBundle : 1);
+      table.start(shape, kHasBundles<Row> ? cpu::kBundle : 1);
       if constexpr (kHasParts<Row>) part_table.start(shape);
     }
     void set_size(std::size_t cell, const Place& count) {
@@ -187,11 +192,18 @@ class SoftStepSolver {
   void sweep_inner(std::size_t block, Sweep sweep);
   void sweep_crossing(Sweep sweep);
   void sweep_overflow(Sweep sweep);
+  template <class F>
+  static void for_fixed_and_others(const RowTable& table, std::size_t first, std::size_t last,
+                                   const F& f);
   cpu::ManifoldSetup manifold_setup();
   void complete_manifolds();
   void unpack_manifolds();
   cpu::SphereSweep sphere_sweep();
   cpu::ManifoldSweep manifold_sweep(bool is_fixed);
+  void pack_bundle(const cpu::FrameSweep& sweep, std::size_t bundle);
+  void pack_frames();
+  void unpack_frames();
+  cpu::FrameSweep frame_sweep();
 
   ThreadPool* pool_;
   bool uses_avx2_;  ///< otherwise rows are solved one by one
@@ -218,6 +230,10 @@ class SoftStepSolver {
   Buffer<cpu::BundleNumbers> bundle_numbers_;
   Buffer<Real> bundle_rows_, bundle_points_;
   bool is_packed_ = false;  ///< whether the impulses of the rows are in the bundles
+  // Of rows of joints with frames, likewise.
+  std::vector<std::uint8_t> frame_used_;  ///< by number: whether it has a row
+  Buffer<cpu::FrameNumbers> frame_numbers_;
+  Buffer<Real> frame_bundles_;
   // Body b of a joint with the world.
   SolverBody world_;
   Mat3 world_inertia_;

@@ -28,6 +28,11 @@ struct Vec3Lanes {
   static Vec3Lanes select(typename S::Mask mask, const Vec3Lanes& a, const Vec3Lanes& b) {
     return {S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z)};
   }
+  Vec3Lanes negated() const { return {S::negate(x), S::negate(y), S::negate(z)}; }
+  /// Whether any component differs.
+  typename S::Mask differs(const Vec3Lanes& o) const {
+    return S::either(S::either(S::differs(x, o.x), S::differs(y, o.y)), S::differs(z, o.z));
+  }
 };
 
 /// Four numbers of each lane: a vector and a scalar.
@@ -73,7 +78,95 @@ struct Mat3Lanes {
              {row[0].y, row[1].y, row[2].y},
              {row[0].z, row[1].z, row[2].z}}};
   }
+  Mat3Lanes operator*(const Mat3Lanes& o) const {
+    const Mat3Lanes columns = o.transposed();
+    return Mat3Lanes{{*this * columns.row[0], *this * columns.row[1], *this * columns.row[2]}}
+        .transposed();
+  }
+  Mat3Lanes operator+(const Mat3Lanes& o) const {
+    return {{row[0] + o.row[0], row[1] + o.row[1], row[2] + o.row[2]}};
+  }
+  static Mat3Lanes select(typename S::Mask mask, const Mat3Lanes& a, const Mat3Lanes& b) {
+    return {{Vec3Lanes<S>::select(mask, a.row[0], b.row[0]),
+             Vec3Lanes<S>::select(mask, a.row[1], b.row[1]),
+             Vec3Lanes<S>::select(mask, a.row[2], b.row[2])}};
+  }
 };
+
+/// A Quat of each lane.
+template <class S>
+struct OrientationLanes {
+  using Vec = typename S::Vec;
+  static constexpr std::size_t kStride = 4;
+  Vec w;
+  Vec3Lanes<S> v;
+
+  static OrientationLanes load(const Real* all, const std::uint32_t* items) {
+    const auto quad = QuadLanes<S>::load(all, kStride, items);
+    return {quad.vector.x, {quad.vector.y, quad.vector.z, quad.scalar}};
+  }
+  void store(Real* all, const std::uint32_t* items, unsigned lanes) const {
+    QuadLanes<S>{{w, v.x, v.y}, v.z}.store(all, kStride, items, lanes);
+  }
+
+  static OrientationLanes identity() {
+    const Vec zero = S::set(0);
+    return {S::set(1), {zero, zero, zero}};
+  }
+  static OrientationLanes select(typename S::Mask mask, const OrientationLanes& a,
+                                 const OrientationLanes& b) {
+    return {S::select(mask, a.w, b.w), Vec3Lanes<S>::select(mask, a.v, b.v)};
+  }
+  OrientationLanes operator*(const OrientationLanes& o) const {
+    return {w * o.w - v.x * o.v.x - v.y * o.v.y - v.z * o.v.z,
+            {w * o.v.x + v.x * o.w + v.y * o.v.z - v.z * o.v.y,
+             w * o.v.y - v.x * o.v.z + v.y * o.w + v.z * o.v.x,
+             w * o.v.z + v.x * o.v.y - v.y * o.v.x + v.z * o.w}};
+  }
+  OrientationLanes conjugate() const { return {w, v.negated()}; }
+  OrientationLanes negated() const { return {S::negate(w), v.negated()}; }
+  /// Whether any component differs.
+  typename S::Mask differs(const OrientationLanes& o) const {
+    return S::either(S::differs(w, o.w), v.differs(o.v));
+  }
+
+  /// add_scaled(q, omega, scale) for a Quat.
+  OrientationLanes add_scaled(const Vec3Lanes<S>& omega, Vec scale) const {
+    const Vec3Lanes<S> r = omega * scale;
+    const Vec zero = S::set(0), half = S::set(Real(0.5));
+    const Vec tw = zero * w - r.x * v.x - r.y * v.y - r.z * v.z;
+    const Vec tx = zero * v.x + r.x * w + r.y * v.z - r.z * v.y;
+    const Vec ty = zero * v.y - r.x * v.z + r.y * w + r.z * v.x;
+    const Vec tz = zero * v.z + r.x * v.y - r.y * v.x + r.z * w;
+    return {w + tw * half, {v.x + tx * half, v.y + ty * half, v.z + tz * half}};
+  }
+  OrientationLanes normalized(Vec shortest2) const {
+    const Vec one = S::set(1), zero = S::set(0);
+    const Vec n2 = w * w + v.x * v.x + v.y * v.y + v.z * v.z;
+    const typename S::Mask is_long = S::less(shortest2, n2);
+    const Vec k = one / S::square_root(n2);
+    return {S::select(is_long, w * k, one),
+            Vec3Lanes<S>::select(is_long, v * k, {zero, zero, zero})};
+  }
+  /// One bit per lane: whether all components are 0.
+  unsigned are_zero() const {
+    const Vec zero = S::set(0);
+    return ~S::bits(differs({zero, {zero, zero, zero}}));
+  }
+};
+
+/// to_matrix(q)
+template <class S>
+Mat3Lanes<S> to_matrix(const OrientationLanes<S>& q) {
+  const auto one = S::set(1);
+  const auto x2 = q.v.x + q.v.x, y2 = q.v.y + q.v.y, z2 = q.v.z + q.v.z;
+  const auto xx = q.v.x * x2, yy = q.v.y * y2, zz = q.v.z * z2;
+  const auto xy = q.v.x * y2, xz = q.v.x * z2, yz = q.v.y * z2;
+  const auto wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
+  return {{{one - (yy + zz), xy - wz, xz + wy},
+           {xy + wz, one - (xx + zz), yz - wx},
+           {xz - wy, yz + wx, one - (xx + yy)}}};
+}
 
 /// Velocities of the bodies of each lane.
 template <class S>
@@ -118,6 +211,27 @@ struct BiasLanes {
             S::select(is_apart, zero, (push - speed) * S::set(constants.h))};
   }
 };
+
+/// Calls one(bundle, lanes) for all bundles of the rows [first, last), where `lanes` has one bit
+/// per row. It returns one bit for each row that it has skipped.
+/// @param left receives the skipped rows. @returns their number
+template <class One>
+std::size_t for_each_bundle(std::size_t first, std::size_t last, std::uint32_t* left,
+                            const One& one) {
+  constexpr unsigned kAll = (1u << kBundle) - 1;
+  std::size_t skipped = 0;
+  for (std::size_t bundle = first / kBundle; bundle * kBundle < last; ++bundle) {
+    const std::size_t begin = bundle * kBundle;
+    unsigned lanes = kAll;
+    if (begin < first) lanes &= kAll << (first - begin);
+    if (last - begin < kBundle) lanes &= (1u << (last - begin)) - 1;
+    for (unsigned bits = one(bundle, lanes); bits != 0; bits &= bits - 1) {
+      left[skipped++] =
+          static_cast<std::uint32_t>(begin) + static_cast<unsigned>(__builtin_ctz(bits));
+    }
+  }
+  return skipped;
+}
 
 /// Calls one(first, count) for all vectors of the rows [first, last), of which the last may be
 /// incomplete. It returns one bit for each row that it has skipped.

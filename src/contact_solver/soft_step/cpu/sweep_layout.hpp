@@ -16,6 +16,8 @@ namespace cpu {
 inline constexpr std::size_t kSweepStride = 16;
 /// Reals per Mat3.
 inline constexpr std::size_t kMatrixStride = 9;
+/// Rows of a bundle: the lanes of a vector.
+inline constexpr std::size_t kBundle = 32 / sizeof(Real);
 
 /// Quadruples of Reals in a SolverBody.
 namespace solver_body_quad {

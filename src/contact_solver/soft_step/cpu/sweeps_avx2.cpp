@@ -1,6 +1,7 @@
 /// Kernels of the sweeps, for AVX2.
 #include "src/contact_solver/avx2_lanes.inl"
 #include "src/contact_solver/soft_step/cpu/body_sweep.inl"
+#include "src/contact_solver/soft_step/cpu/frame_sweep.inl"
 #include "src/contact_solver/soft_step/cpu/manifold_setup.inl"
 #include "src/contact_solver/soft_step/cpu/manifold_sweep.inl"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.inl"
@@ -73,6 +74,8 @@ constinit const BodySweepKernels kAvx2BodySweep = {
     move_bodies<Avx2>, {accelerate_bodies<Avx2, false>, accelerate_bodies<Avx2, true>}};
 constinit const SphereSweepKernels kAvx2SphereSweep = {warm_start<Avx2>,
                                                        {solve<Avx2, false>, solve<Avx2, true>}};
+constinit const FrameSweepKernels kAvx2FrameSweep[2] = {frame_kernels<Avx2, false>(),
+                                                        frame_kernels<Avx2, true>()};
 constinit const BundleFunction kAvx2UnpackManifolds = unpack_manifolds<Avx2>;
 constinit const ManifoldSweepKernels kAvx2ManifoldSweep[2] = {
     {complete_manifolds<Avx2, false>,
