@@ -438,6 +438,34 @@ TEST(FrameJoint, SlowMotorsAndSpringsDoNotFallAsleep) {
   EXPECT_NEAR(static_cast<double>(world.joint_state(world.joints()[1]).position), 1, 0.02);
 }
 
+// If contacts projected the bodies, joints would be 14 cm open, and the bars would still overlap.
+TEST(FrameJoint, StaysClosedWhileBarsThatItHoldsArePushedApart) {
+  for (const Real overlap : {0.06_r, 0.12_r, 0.2_r}) {
+    Scene scene;
+    const auto add = [&scene](const Vec3& position, const Vec3& half_extents) {
+      scene.bodies.push_back(bar(position, half_extents));
+      scene.bodies.back().acceleration = {};
+      return BodyId{static_cast<std::uint32_t>(scene.bodies.size() - 1), 0};
+    };
+    const BodyId post = add({-0.7_r, 0, 0}, {0.1_r, 1, 0.1_r});
+    for (const Real side : {Real(-1), Real(1)}) {
+      const Real height = side * (0.1_r - overlap / 2);
+      scene.joints.push_back(BallJoint{.a = add({0, height, 0}, {0.5_r, 0.1_r, 0.1_r}),
+                                       .b = post,
+                                       .anchor_a = {-0.6_r, 0, 0},
+                                       .anchor_b = {0.1_r, height, 0}});
+    }
+    World world(scene);
+    double gap = 0;
+    for (int n = 0; n < 120; ++n) {
+      world.step();
+      gap = std::max(gap, largest_gap(world));
+    }
+    EXPECT_LT(gap, 0.005) << overlap;
+    for (const Contact& contact : world.contacts()) EXPECT_GT(contact.distance, -0.001_r);
+  }
+}
+
 TEST(FrameJoint, RagdollsComeToRest) {
   World world(scenes::make("ragdolls", {.spheres = 20}));
   for (int n = 0; n < 10 * 60; ++n) world.step();

@@ -62,6 +62,9 @@ struct alignas(4 * sizeof(Real)) ManifoldRow {
   Real slip_mass = 0;                   ///< [kg], the smallest effective mass of a tangent
   Real rolling_friction = 0, spinning_friction = 0;  ///< [m]
   Vec3 rolling_impulse;  ///< [N m s], torque impulse of rolling and spinning friction on a
+  /// Whether a movable body has joints. Such a contact does not project the bodies: it would pull
+  /// joints open, and tangled limbs would stay tangled.
+  std::uint32_t is_jointed = 0;
 };
 
 /// Writes the fields that a sweep changes.
@@ -253,7 +256,8 @@ JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, cons
     points[i].normal_impulse = normal_impulse;
     if (normal_impulse > 0 && !has_pushed(p)) points[i].rebound = -p.rebound;
     apply<kFixed>(pair, n * along, p.spin_a * along, p.spin_b * along);
-    if (bias.projection > 0) project<kFixed>(pair, p, n, bias.projection * p.normal_mass);
+    if (bias.projection > 0 && row.is_jointed == 0)
+      project<kFixed>(pair, p, n, bias.projection * p.normal_mass);
   }
 }
 

@@ -26,12 +26,17 @@ struct BodyTraits {
   static constexpr std::uint8_t kIsFast = 0x80;
 };
 
+/// Values of StepBodies::constrained. A body with joints may have contacts, too; kHasDrive: one of
+/// the joints has a spring or a motor.
+inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2, kHasDrive = 3;
+
 /// Properties of the bodies at the start of a step, as arrays by body.
 struct BodyProperties {
-  const Mat3* inverse_inertia = nullptr;  ///< [1/(kg m^2)], world axes
-  const Vec3* acceleration = nullptr;     ///< [m/s^2], of this step
-  const Real* radius = nullptr;           ///< [m]; 0: not a sphere
-  const std::uint8_t* traits = nullptr;   ///< bits of BodyTraits
+  const Mat3* inverse_inertia = nullptr;      ///< [1/(kg m^2)], world axes
+  const Vec3* acceleration = nullptr;         ///< [m/s^2], of this step
+  const Real* radius = nullptr;               ///< [m]; 0: not a sphere
+  const std::uint8_t* traits = nullptr;       ///< bits of BodyTraits
+  const std::uint8_t* constrained = nullptr;  ///< as StepBodies::constrained
   const Real *friction = nullptr, *restitution = nullptr;
   const Real *rolling_friction = nullptr, *spinning_friction = nullptr;  ///< [m]
   MaterialSettings rules;
@@ -195,6 +200,7 @@ struct RowSetup {
     const Vec3 rolling =
         rolls && contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
     row->rolling_impulse = flipped ? -rolling : rolling;
+    row->is_jointed = joints.count > 0 && (is_joined(row->a) || is_joined(row->b)) ? 1 : 0;
     return restitution;
   }
   template <bool kFixed>
@@ -458,6 +464,9 @@ struct RowSetup {
   }
   JFPX_HD bool is_movable(std::uint32_t body) const {
     return (properties.traits[body] & BodyTraits::kMovable) != 0;
+  }
+  JFPX_HD bool is_joined(std::uint32_t body) const {
+    return is_movable(body) && properties.constrained[body] >= kHasJoint;
   }
   JFPX_HD static bool sleeps(std::uint8_t traits) {
     return (traits & (BodyTraits::kMovable | BodyTraits::kActive)) == BodyTraits::kMovable;

@@ -373,8 +373,9 @@ struct StepData {
     return {contacts(),
             joints(),
             {bodies.inverse_inertia, bodies.last_acceleration, bodies.radius, step.traits,
-             bodies.friction, bodies.restitution, bodies.rolling_friction, bodies.spinning_friction,
-             materials, bodies.position, step.orientation, bodies.orientation},
+             step.constrained, bodies.friction, bodies.restitution, bodies.rolling_friction,
+             bodies.spinning_friction, materials, bodies.position, step.orientation,
+             bodies.orientation},
             step.solver,
             constants.restitution_threshold,
             constants.inverse_friction_gap};

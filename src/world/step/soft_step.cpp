@@ -202,6 +202,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
                                 .acceleration = view.last_acceleration,
                                 .radius = view.radius,
                                 .traits = traits_.data(),
+                                .constrained = constrained_.data(),
                                 .friction = view.friction,
                                 .restitution = view.restitution,
                                 .rolling_friction = view.rolling_friction,

@@ -41,10 +41,6 @@ JFPX_HD inline void wake_touched(const BodyView& bodies, const MotionPointers& m
   if (mark == kTouchesSlowBody) motion.wake_by_slow_body(bodies, i);
 }
 
-/// Values of StepBodies::constrained. A body with joints may have contacts, too; kHasDrive: one of
-/// the joints has a spring or a motor.
-inline constexpr std::uint8_t kHasContact = 1, kHasJoint = 2, kHasDrive = 3;
-
 /// Calls f(a, b) if a joint is one of two bodies.
 template <class F>
 JFPX_HD inline void with_joined_bodies(const JointView& joints, std::uint32_t joint, const F& f) {

@@ -476,14 +476,14 @@ class FrameLanes {
   template <bool kUseBias>
   void solve_limits(Mask mask) {
     using namespace frame_vector;
-    const Vec zero = S::set(0), far = S::set(2);
+    const Vec zero = S::set(0), opposite = S::set(2);
     const Vec lower = vector(kLowerSine), upper = vector(kUpperSine);
     const Vec lower_cosine = vector(kLowerCosine), upper_cosine = vector(kUpperCosine);
     Vec s = twist_.v.x, c = twist_.w;
     const Mask is_back = S::less(s * (lower + upper) + c * (lower_cosine + upper_cosine), zero);
     s = S::select(is_back, S::negate(s), s), c = S::select(is_back, S::negate(c), c);
     const auto gap_to = [&](Vec sine, Vec cosine, Real side) {
-      return S::select(S::less(c * cosine + s * sine, zero), far,
+      return S::select(S::less(c * cosine + s * sine, zero), opposite,
                        S::set(2 * side) * (s * cosine - c * sine));
     };
     const Vectors axis = twist_axis();

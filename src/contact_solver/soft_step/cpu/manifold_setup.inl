@@ -38,6 +38,12 @@ class StartedLanes {
           numbers,
           setup.rows + rows_[k] * manifold_row_offset::kStride + manifold_row_offset::kNumbers,
           sizeof numbers);
+      std::uint32_t is_jointed = 0;
+      __builtin_memcpy(
+          &is_jointed,
+          setup.rows + rows_[k] * manifold_row_offset::kStride + manifold_row_offset::kIsJointed,
+          sizeof is_jointed);
+      is_jointed_ |= is_jointed << k;
       a_[k] = numbers[0], b_[k] = numbers[1], first_[k] = numbers[2];
       last_[k] = numbers[2] + numbers[3] - 1;
       counts[k] = static_cast<Real>(numbers[3]);
@@ -144,6 +150,7 @@ class StartedLanes {
       numbers_->a[lane] = a_[lane], numbers_->b[lane] = b_[lane];
     }
     numbers_->used = used_;
+    numbers_->is_jointed = is_jointed_;
     numbers_->rolls =
         S::bits(S::either(S::less(zero, rolling.vector.y), S::less(zero, rolling.vector.z)));
     put(bundle_vector::kNormal, normal);
@@ -287,7 +294,7 @@ class StartedLanes {
   Real* row_;
   Real* points_;
   unsigned most_;  ///< largest number of points
-  unsigned used_ = 0;
+  unsigned used_ = 0, is_jointed_ = 0;
   std::uint32_t rows_[kLanes], a_[kLanes], b_[kLanes];
   std::uint32_t first_[kLanes], last_[kLanes];  ///< points
   Vec counts_;                                  ///< numbers of points

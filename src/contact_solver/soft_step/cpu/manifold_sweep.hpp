@@ -26,7 +26,8 @@ inline constexpr std::size_t kLeverY = kNormal + 24;
 inline constexpr std::size_t kTwist = kNormal + 36;             ///< twist a and b, xx, xy
 inline constexpr std::size_t kFrictionImpulses = kNormal + 44;  ///< x, y, twist, then yy
 inline constexpr std::size_t kRolling = kNormal + 48;  ///< slip mass, rolling and spinning friction
-inline constexpr std::size_t kStride = sizeof(Real) == 4 ? 60 : 56;
+inline constexpr std::size_t kIsJointed = kNormal + 54;  ///< a number of 32 bits
+inline constexpr std::size_t kStride = 60;
 }  // namespace manifold_row_offset
 
 /// Largest number of points of a row.
@@ -77,6 +78,7 @@ struct BundleNumbers {
   std::uint32_t a[kBundle], b[kBundle];  ///< bodies
   std::uint32_t used;                    ///< one bit per lane with a row
   std::uint32_t rolls;                   ///< rows with rolling or spinning friction
+  std::uint32_t is_jointed;              ///< rows that do not project
 };
 
 /// The bundles of all rows.

@@ -194,12 +194,13 @@ class ManifoldLanes {
     apply(active, normal * along, spin_a * along, spin_b * along);
     if constexpr (kUseBias) {
       const Mask projects = S::both(active, S::less(zero, bias.projection));
-      const unsigned bits = S::bits(projects);
+      const unsigned bits = S::bits(projects) & ~numbers_.is_jointed;
       if (bits == 0) return 0;
+      const Mask mask = S::mask_of(bits);
       const Vec size = bias.projection * mass;
       const Vectors push = normal * size;
       const auto project = [&](Vectors* value, const Vectors& to) {
-        *value = Vectors::select(projects, to, *value);
+        *value = Vectors::select(mask, to, *value);
       };
       project(&moved->shift_a, moved->shift_a + push * body_a_.velocity.scalar);
       project(&moved->rotation_a, moved->rotation_a + spin_a * size);

@@ -76,6 +76,7 @@ static_assert(offsetof(ManifoldRow, yy) == (manifold::kFrictionImpulses + 3) * k
 static_assert(offsetof(ManifoldRow, slip_mass) == manifold::kRolling * kReal);
 static_assert(offsetof(ManifoldRow, rolling_friction) == (manifold::kRolling + 1) * kReal);
 static_assert(offsetof(ManifoldRow, spinning_friction) == (manifold::kRolling + 2) * kReal);
+static_assert(offsetof(ManifoldRow, is_jointed) == manifold::kIsJointed * kReal);
 static_assert(cpu::kMostPoints == detail::PairManifold::kMaxPoints);
 static_assert(sizeof(PointRow) == cpu::kSweepStride * kReal);
 static_assert(offsetof(PointRow, turn_a) == cpu::point_row_quad::kTurnA * kReal);
