@@ -1,4 +1,4 @@
-/// Implementation of ThreadPool: threads take chunks from shared counters.
+/// Implementation of ThreadPool: threads take chunks from counters that all of them can see.
 #include "src/base/thread_pool.hpp"
 
 #include <jfpx/error.hpp>
@@ -38,7 +38,15 @@ constexpr auto kInterruption = std::chrono::microseconds(500);
 /// Time after an interruption in which workers poll only briefly: longer polling would take cores
 /// from threads with work.
 constexpr auto kCrowded = std::chrono::milliseconds(50);
-constexpr std::uint64_t kChunksLeft = 0xffffffffu;
+/// A count of chunks, and the number of their job in the other bits.
+constexpr unsigned kCountBits = 24;
+constexpr std::uint64_t kCount = (std::uint64_t{1} << kCountBits) - 1;
+/// Before this job number is exceeded, the process runs for a century.
+constexpr std::uint64_t of_job(std::uint64_t number, std::uint64_t count) {
+  return number << kCountBits | count;
+}
+constexpr std::uint64_t number_of(std::uint64_t value) { return value >> kCountBits; }
+constexpr std::uint64_t count_of(std::uint64_t value) { return value & kCount; }
 /// A thread takes this fraction of the remaining chunks, up to a limit: a descheduled thread delays
 /// the loop by its portion.
 constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
@@ -74,16 +82,19 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   std::exception_ptr run(const Loop& loop);
 
  private:
-  /// Part of a loop, limited to the number of chunks that a ticket can count.
+  /// Part of a loop, limited to kCount chunks.
   struct Job {
     Loop loop;
     std::size_t first = 0;                 ///< number of the first chunk
     FloatingPointEnvironment environment;  ///< of the calling thread
   };
   /// Chunks of a thread.
-  struct alignas(64) Ticket {
-    /// Number of the job in the upper half, number of remaining chunks in the lower half.
-    std::atomic<std::uint64_t> value{0};
+  struct alignas(64) Chunks {
+    /// Those that no thread has taken, as of_job(). The first thread that needs the value of a job
+    /// sets it: the caller need not write to the caches of all threads.
+    std::atomic<std::uint64_t> left{0};
+    /// Those that this thread has completed, of any thread, as of_job(). Only it writes the value.
+    alignas(64) std::atomic<std::uint64_t> done{0};
   };
 
   static bool may_start(unsigned threads);
@@ -93,10 +104,12 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   void work(unsigned self);
   void wait_for_job(std::uint32_t* seen);
   void poll(std::uint32_t last);
-  void take_chunks(unsigned self);
-  void take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared);
-  void run_chunks(std::size_t first, std::uint32_t count);
-  std::size_t first_chunk(unsigned owner) const;
+  void take_chunks(unsigned self, std::uint64_t job);
+  bool take_chunks_of(unsigned owner, unsigned self, std::uint64_t job, std::uint64_t* done);
+  void run_chunks(std::size_t first, std::uint64_t count);
+  void report(unsigned self, std::uint64_t done);
+  bool is_complete(std::uint64_t job) const;
+  std::uint64_t first_chunk(std::uint64_t chunks, unsigned owner) const;
 
   /// Workers that pools may share.
   static constinit Workers* list_;
@@ -105,18 +118,20 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   Workers* next_ = nullptr;
   std::thread::id creator_ = std::this_thread::get_id();
 
-  /// The current job. A thread may read it only between taking a chunk and completing it, because
+  /// The current job. A thread may read it only between taking a chunk and reporting it, because
   /// the next job overwrites it.
   Job job_;
   unsigned requested_, thread_count_ = 1;
-  unsigned polls_ = 0;                 ///< number of polls before a worker sleeps
-  std::unique_ptr<Ticket[]> tickets_;  ///< by thread; 0 is the caller
+  unsigned polls_ = 0;                ///< number of polls before a worker sleeps
+  std::unique_ptr<Chunks[]> chunks_;  ///< by thread; 0 is the caller
   std::atomic<bool> busy_{false};
   /// Since the epoch of the clock.
   std::atomic<Clock::duration> crowded_until_{Clock::duration::zero()};
-  alignas(64) std::atomic<std::uint32_t> number_{0};  ///< of the last job
-  alignas(64) std::atomic<std::uint32_t> done_{0};    ///< completed chunks of the job
+  alignas(64) std::atomic<std::uint64_t> published_{0};  ///< number and chunks of the last job
+  std::atomic<std::uint32_t> number_{0};                 ///< low bits of the number, to wait for
   std::atomic<bool> stopped_{false};
+  /// Whether the caller sleeps until all chunks are completed.
+  alignas(64) std::atomic<std::uint32_t> caller_sleeps_{0};
 
   std::mutex error_mutex_;
   std::exception_ptr error_;
@@ -191,7 +206,7 @@ std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::start(unsigned threads
 ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
   // A polling worker must not take the core of another thread.
   if (threads <= std::thread::hardware_concurrency()) polls_ = kPolls;
-  tickets_ = std::make_unique<Ticket[]>(threads);
+  chunks_ = std::make_unique<Chunks[]>(threads);
   workers_.reserve(threads - 1);
   try {
     for (unsigned self = 1; self < threads; ++self) {
@@ -221,11 +236,10 @@ ThreadPool::Workers::~Workers() {
 
 std::exception_ptr ThreadPool::Workers::run(const Loop& loop) {
   Job job;
-  // Loops with more chunks than a ticket can count are split.
-  constexpr std::size_t kMaxChunks = 0xffffffffu;
-  for (job.first = 0; job.first < loop.chunks; job.first += kMaxChunks) {
+  // Loops with more chunks than a job may have are split.
+  for (job.first = 0; job.first < loop.chunks; job.first += kCount) {
     job.loop = loop;
-    job.loop.chunks = std::min(loop.chunks - job.first, kMaxChunks);
+    job.loop.chunks = std::min<std::size_t>(loop.chunks - job.first, kCount);
     run_job(job);
   }
   return std::exchange(error_, nullptr);
@@ -233,32 +247,31 @@ std::exception_ptr ThreadPool::Workers::run(const Loop& loop) {
 
 void ThreadPool::Workers::run_job(const Job& job) {
   job_ = job;
-  done_.store(0, std::memory_order_relaxed);
-  const std::uint32_t number = number_.load(std::memory_order_relaxed) + 1;
-  for (unsigned owner = 0; owner < thread_count_; ++owner) {
-    const std::uint64_t chunks = first_chunk(owner + 1) - first_chunk(owner);
-    tickets_[owner].value.store(std::uint64_t{number} << 32 | chunks, std::memory_order_release);
-  }
-  number_.store(number);
+  const std::uint64_t number = number_of(published_.load(std::memory_order_relaxed)) + 1;
+  const std::uint64_t published = of_job(number, job.loop.chunks);
+  published_.store(published, std::memory_order_release);
+  number_.store(static_cast<std::uint32_t>(number));
   wake_all(number_);
-  take_chunks(0);
+  take_chunks(0, published);
   // Does not wait for workers without a chunk: on a loaded machine that would take longer than the
   // loop.
-  const auto chunks = static_cast<std::uint32_t>(job.loop.chunks);
-  for (unsigned i = 0;; ++i) {
-    const std::uint32_t done = done_.load(std::memory_order_acquire);
-    if (done == chunks) break;
+  for (unsigned i = 0; !is_complete(published); ++i) {
     if (i < polls_) {
       pause();
-    } else {
-      wait_while_equal(done_, done);
+      continue;
     }
+    caller_sleeps_.store(1);
+    if (is_complete(published)) break;
+    wait_while_equal(caller_sleeps_, 1);
   }
+  caller_sleeps_.store(0, std::memory_order_relaxed);
 }
 
 void ThreadPool::Workers::work(unsigned self) {
   std::uint32_t seen = 0;
-  for (wait_for_job(&seen); !stopped_; wait_for_job(&seen)) take_chunks(self);
+  for (wait_for_job(&seen); !stopped_; wait_for_job(&seen)) {
+    take_chunks(self, published_.load(std::memory_order_acquire));
+  }
 }
 
 /// @param seen number of the last job
@@ -287,40 +300,59 @@ void ThreadPool::Workers::poll(std::uint32_t last) {
   }
 }
 
-/// The first chunk of a thread, among those of the job; for `owner` = thread_count_, their end.
-std::size_t ThreadPool::Workers::first_chunk(unsigned owner) const {
-  return job_.loop.chunks * owner / thread_count_;
+/// The first chunk of a thread, among those of a job; for `owner` = thread_count_, their end.
+std::uint64_t ThreadPool::Workers::first_chunk(std::uint64_t chunks, unsigned owner) const {
+  return chunks * owner / thread_count_;
+}
+
+/// Whether all chunks are completed.
+bool ThreadPool::Workers::is_complete(std::uint64_t job) const {
+  std::uint64_t sum = 0;
+  for (unsigned thread = 0; thread < thread_count_; ++thread) {
+    const std::uint64_t done = chunks_[thread].done.load();
+    if (number_of(done) == number_of(job)) sum += count_of(done);
+  }
+  return sum == count_of(job);
 }
 
 /// Takes the chunks of thread `self`, then remaining chunks of other threads.
-void ThreadPool::Workers::take_chunks(unsigned self) {
-  std::uint32_t prepared = 0;  // number of the job whose environment is set
+/// @param job number and chunks
+void ThreadPool::Workers::take_chunks(unsigned self, std::uint64_t job) {
+  std::uint64_t done = 0;
   for (unsigned i = 0; i < thread_count_; ++i) {
-    take_chunks_of((self + i) % thread_count_, self > 0, &prepared);
+    if (!take_chunks_of((self + i) % thread_count_, self, job, &done)) return;
   }
 }
 
 /// Takes a portion of the remaining chunks at a time, so that threads rarely access shared counters
 /// and still end at the same time (guided self-scheduling, Polychronopoulos and Kuck 1987).
-/// @param is_worker whether the thread must copy the floating-point environment of the caller
-void ThreadPool::Workers::take_chunks_of(unsigned owner, bool is_worker, std::uint32_t* prepared) {
-  std::atomic<std::uint64_t>& value = tickets_[owner].value;
-  std::uint64_t ticket = value.load();
-  while ((ticket & kChunksLeft) != 0) {
-    const std::uint64_t left = ticket & kChunksLeft;
+/// @param done number of chunks of the job that the thread has completed
+/// @returns false if the job is completed, and another one has begun
+bool ThreadPool::Workers::take_chunks_of(unsigned owner, unsigned self, std::uint64_t job,
+                                         std::uint64_t* done) {
+  const std::uint64_t end = first_chunk(count_of(job), owner + 1);
+  const std::uint64_t all = end - first_chunk(count_of(job), owner);
+  if (all == 0) return true;
+  std::atomic<std::uint64_t>& value = chunks_[owner].left;
+  for (std::uint64_t left_of_job = value.load();;) {
+    if (number_of(left_of_job) > number_of(job)) return false;
+    // The job is not completed while the value is that of an earlier one.
+    const std::uint64_t left =
+        number_of(left_of_job) == number_of(job) ? count_of(left_of_job) : all;
+    if (left == 0) return true;
     const std::uint64_t taken =
         std::clamp<std::uint64_t>(left / kPortionDivisor, 1, kLargestPortion);
-    if (!value.compare_exchange_weak(ticket, ticket - taken)) continue;
-    const auto number = static_cast<std::uint32_t>(ticket >> 32);
-    if (is_worker && *prepared != number) job_.environment.apply();
-    *prepared = number;
-    run_chunks(job_.first + first_chunk(owner + 1) - left, static_cast<std::uint32_t>(taken));
-    ticket = value.load();
+    if (!value.compare_exchange_weak(left_of_job, of_job(number_of(job), left - taken))) continue;
+    // Worker threads have the environment of the caller.
+    if (self > 0 && *done == 0) job_.environment.apply();
+    run_chunks(job_.first + end - left, taken);
+    *done += taken;
+    report(self, of_job(number_of(job), *done));
+    left_of_job = value.load();
   }
 }
 
-void ThreadPool::Workers::run_chunks(std::size_t first, std::uint32_t count) {
-  const auto chunks = static_cast<std::uint32_t>(job_.loop.chunks);
+void ThreadPool::Workers::run_chunks(std::size_t first, std::uint64_t count) {
   for (std::size_t chunk = first; chunk < first + count; ++chunk) {
     try {
       job_.loop.call(job_.loop.body, chunk);
@@ -332,8 +364,15 @@ void ThreadPool::Workers::run_chunks(std::size_t first, std::uint32_t count) {
       }
     }
   }
-  // After the last chunk, the next job may begin at once and overwrite this one.
-  if (done_.fetch_add(count, std::memory_order_acq_rel) + count == chunks) wake_one(done_);
+}
+
+/// Reports completed chunks. After the last one, the next job may begin at once and overwrite this
+/// one.
+void ThreadPool::Workers::report(unsigned self, std::uint64_t done) {
+  chunks_[self].done.store(done);
+  if (self == 0 || caller_sleeps_.load() == 0) return;
+  caller_sleeps_.store(0);
+  wake_one(caller_sleeps_);
 }
 
 void ThreadPool::check(unsigned threads) {
