@@ -27,7 +27,7 @@ using soft_step::ContactKey;
 using soft_step::ContactSet;
 using soft_step::ContactView;
 
-constexpr std::size_t kBodiesPerChunk = 512, kContactsPerChunk = 2048;
+constexpr std::size_t kBodiesPerChunk = 128, kContactsPerChunk = 2048;
 constexpr std::size_t kBodiesPerKernel = 64;
 
 }  // namespace

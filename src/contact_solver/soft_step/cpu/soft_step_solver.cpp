@@ -25,7 +25,7 @@ constexpr std::size_t kRowsPerKernel = 64;
 [[maybe_unused]] constexpr std::size_t kBundlesPerChunk = 128;
 static_assert(kRowsPerKernel % cpu::kBundle == 0);
 // Of a world of one block.
-constexpr std::size_t kContactsPerPart = 512, kBodiesPerPart = 1024, kPartsPerChunk = 2;
+constexpr std::size_t kBodiesPerPart = 128;
 
 // The layout that sphere_sweep.hpp assumes.
 constexpr std::size_t kReal = sizeof(Real);
@@ -175,10 +175,9 @@ void SoftStepSolver::inspect_contacts() {
       pool_, count, kContactsPerChunk, Ends{}, inspect, [](const Ends& x, const Ends& y) {
         return Ends{std::max(x.inner, y.inner), std::max(x.crossing, y.crossing)};
       });
-  const std::size_t parts = (count + kContactsPerPart - 1) / kContactsPerPart;
-  const std::size_t fixed_parts = (bodies_.size() + kBodiesPerPart - 1) / kBodiesPerPart;
-  shape_ = has_blocks_ ? RowTable::Shape{blocks_.size(), ends.inner, ends.crossing, blocks_.size()}
-                       : RowTable::Shape{parts, 0, ends.crossing, fixed_parts};
+  const std::size_t parts =
+      has_blocks_ ? blocks_.size() : (bodies_.size() + kBodiesPerPart - 1) / kBodiesPerPart;
+  shape_ = {parts, has_blocks_ ? ends.inner : 0, ends.crossing, parts};
 }
 
 /// Finds the contacts of each body a in a list that is sorted by key.
@@ -202,19 +201,20 @@ void SoftStepSolver::find_ranges(const Contact* contacts, std::uint32_t count,
   std::fill(begin.begin() + next, begin.end(), count);
 }
 
-/// Sorts the joints of two movable bodies by block.
+/// Sorts the joints of two movable bodies by part.
 void SoftStepSolver::list_joints() {
   joints_.clear();
   const std::uint32_t first = setup_.contacts.size();
   for (std::uint32_t i = first; i < setup_.size(); ++i) {
     if (kinds_[i] == kNoRow || !is_color(setup_.color_of(i))) continue;
-    joints_.push_back({blocks_.block(setup_.key(i).a), i});
+    joints_.push_back({part_of(setup_.key(i).a), i});
   }
   std::ranges::sort(joints_);
 }
 
-std::size_t SoftStepSolver::fixed_part(std::uint32_t body) const {
-  return has_blocks_ ? blocks_.block(body) : body / kBodiesPerPart;
+/// The part of a movable body.
+std::uint32_t SoftStepSolver::part_of(std::uint32_t body) const {
+  return has_blocks_ ? blocks_.block(body) : body / static_cast<std::uint32_t>(kBodiesPerPart);
 }
 
 /// Divides the listed contacts into the overflow, and those with fixed bodies by part.
@@ -229,14 +229,14 @@ void SoftStepSolver::group_fixed() {
     if (is_overflow(listed)) {
       overflow_.push_back(listed);
     } else {
-      ++fixed_begin_[fixed_part(listed.body) + 2];
+      ++fixed_begin_[part_of(listed.body) + 2];
       ++count;
     }
   }
   std::partial_sum(fixed_begin_.begin(), fixed_begin_.end(), fixed_begin_.begin());
   resize_geometric(&fixed_, count);
   for (const ListedContact& listed : listed_) {
-    if (!is_overflow(listed)) fixed_[fixed_begin_[fixed_part(listed.body) + 1]++] = listed;
+    if (!is_overflow(listed)) fixed_[fixed_begin_[part_of(listed.body) + 1]++] = listed;
   }
   std::ranges::sort(overflow_, [](const ListedContact& x, const ListedContact& y) {
     return std::tie(x.kind, x.contact) < std::tie(y.kind, y.contact);
@@ -263,12 +263,6 @@ void SoftStepSolver::for_contacts(std::size_t part, const F& f) const {
     const std::uint32_t color = setup_.color_of(contact);
     if (is_color(color)) f(contact, color);
   };
-  if (!has_blocks_) {
-    const std::size_t first = part * kContactsPerPart;
-    const std::size_t last = std::min<std::size_t>(first + kContactsPerPart, setup_.size());
-    for (std::size_t i = first; i < last; ++i) visit(static_cast<std::uint32_t>(i));
-    return;
-  }
   const std::uint32_t spheres = setup_.contacts.sphere_count;
   const auto visit_contacts = [&](std::uint32_t body) {
     if (!first_sphere_.empty()) {
@@ -280,10 +274,18 @@ void SoftStepSolver::for_contacts(std::size_t part, const F& f) const {
       }
     }
   };
-  blocks_.for_bodies(part, visit_contacts, [this](std::uint32_t body) { prefetch_contacts(body); });
-  const auto block = static_cast<std::uint32_t>(part);
-  for (auto joint = std::ranges::lower_bound(joints_, BlockJoint{block, 0});
-       joint != joints_.end() && joint->block == block; ++joint) {
+  const auto number = static_cast<std::uint32_t>(part);
+  if (has_blocks_) {
+    blocks_.for_bodies(part, visit_contacts,
+                       [this](std::uint32_t body) { prefetch_contacts(body); });
+  } else {
+    const std::size_t end = std::min((part + 1) * kBodiesPerPart, bodies_.size());
+    for (std::size_t body = part * kBodiesPerPart; body < end; ++body) {
+      if (bodies_[body].inverse_mass > 0) visit_contacts(static_cast<std::uint32_t>(body));
+    }
+  }
+  for (auto joint = std::ranges::lower_bound(joints_, PartJoint{number, 0});
+       joint != joints_.end() && joint->part == number; ++joint) {
     visit(joint->contact);
   }
 }
@@ -417,11 +419,9 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   any_rebound_.store(false, std::memory_order_relaxed);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
-  if (has_blocks) {
-    find_ranges(setup_.contacts.spheres, setup_.contacts.sphere_count, &first_sphere_);
-    find_ranges(setup_.contacts.manifolds, setup_.contacts.manifold_count, &first_manifold_);
-    list_joints();
-  }
+  find_ranges(setup_.contacts.spheres, setup_.contacts.sphere_count, &first_sphere_);
+  find_ranges(setup_.contacts.manifolds, setup_.contacts.manifold_count, &first_manifold_);
+  list_joints();
   group_fixed();
   allocate_rows();
   for_parts(shape_.parts, [this](std::size_t part) { place_rows(part); });
@@ -600,10 +600,7 @@ void SoftStepSolver::place_overflow() {
 /// Calls f(part) for all parts.
 template <class F>
 void SoftStepSolver::for_parts(std::size_t parts, const F& f) {
-  const std::size_t chunk = has_blocks_ ? 1 : kPartsPerChunk;
-  parallel_for(pool_, parts, chunk, [&](std::size_t first, std::size_t last) {
-    for (std::size_t part = first; part < last; ++part) f(part);
-  });
+  parallel_for(pool_, parts, 1, [&](std::size_t part, std::size_t) { f(part); });
 }
 
 /// Calls f(operation) with the operation of a sweep.

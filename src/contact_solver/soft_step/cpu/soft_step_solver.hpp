@@ -44,9 +44,10 @@ enum class Sweep : std::uint8_t {
 /// different movable bodies with fixed bodies: first the first row of each body, then the second
 /// ones.
 ///
-/// Contacts are divided into parts: blocks, or ranges of contacts in a world of one block. A thread
-/// solves all inner rows of a block, so that the bodies stay in the cache of a core; threads share
-/// the colors of crossing rows, and those of a world of one block.
+/// Contacts are divided into parts by their body a: blocks, or ranges of bodies in a world of one
+/// block. A thread solves all inner rows of a block, so that the bodies stay in the cache of a
+/// core. Threads share the colors of crossing rows, and those of a world of one block, by parts: in
+/// all colors, a thread has the rows of contacts and joints of about the same bodies.
 ///
 /// Owns its buffers, which grow and never shrink. In a step: build(), then sweep() as the
 /// integrator requires, then store().
@@ -130,10 +131,10 @@ class SoftStepSolver {
     RowKind kind = kNoRow;
   };
   /// A joint of two movable bodies.
-  struct BlockJoint {
-    std::uint32_t block = 0;    ///< of body a
+  struct PartJoint {
+    std::uint32_t part = 0;     ///< of body a
     std::uint32_t contact = 0;  ///< its number
-    friend auto operator<=>(const BlockJoint&, const BlockJoint&) = default;
+    friend auto operator<=>(const PartJoint&, const PartJoint&) = default;
   };
   struct Cursors;
 
@@ -171,7 +172,7 @@ class SoftStepSolver {
   void prefetch_contacts(std::uint32_t body) const;
   template <class F>
   void for_contacts(std::size_t part, const F& f) const;
-  std::size_t fixed_part(std::uint32_t body) const;
+  std::uint32_t part_of(std::uint32_t body) const;
   std::span<ListedContact> fixed_of(std::size_t part) {
     return std::span(fixed_).subspan(fixed_begin_[part],
                                      fixed_begin_[part + 1] - fixed_begin_[part]);
@@ -216,7 +217,7 @@ class SoftStepSolver {
 
   std::vector<RowKind> kinds_;                                ///< by contact
   std::vector<std::uint32_t> first_sphere_, first_manifold_;  ///< by body a, and the end
-  std::vector<BlockJoint> joints_;                            ///< sorted
+  std::vector<PartJoint> joints_;                             ///< sorted
   std::vector<ListedContact> fixed_;        ///< by part, then by (body, RowSetup::fixed_order())
   std::vector<std::uint32_t> fixed_begin_;  ///< by part, and the end
   std::vector<ListedContact> overflow_;     ///< sorted by (kind, contact)
