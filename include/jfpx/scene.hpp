@@ -41,7 +41,9 @@ struct SoftStepSettings {
   /// [-], in [0.01, 1000], of the contact springs. Between two movable spheres without rolling
   /// friction, multiplied by 6, or by 2 if they penetrate by more than 3 % of the smaller radius.
   Real damping_ratio = 1;
-  Real push_out_speed = 3;  ///< [m/s], > 0: maximum speed that removes a penetration
+  /// [m/s], > 0: maximum speed that removes a penetration. In contacts of bodies with joints that
+  /// are not between two spheres, a sixth of it.
+  Real push_out_speed = 3;
   Real restitution_threshold = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
   /// [m], >= 0. Closer pairs have speculative contacts in the solver before they touch. For small
   /// bodies, the margin is 8 % of the smaller radius or half extent.
