@@ -171,7 +171,7 @@ def main():
         base = results[name].get("jfpx")
         row(scenes.SCENES[name][1], *(time_words(results[name].get(engine), base) for engine in used))
     print("\nAfter the last step: deepest penetration, mm; root mean square of the speeds, mm/s; of the pyramid,"
-          "\nlargest displacement, mm; of the figures, largest error of a joint, mm:\n")
+          "\nlargest displacement, mm; of the figures and the net, largest error of a joint, mm:\n")
     row("scene", *titles)
     row(*["---"] * (len(titles) + 1))
     for name in results:

@@ -34,11 +34,14 @@ def deepest_penetration(scene, states):
 
 def joint_error(scene, states):
     """Largest distance of the two points of a joint, in m."""
-    row = {i: n for n, i in enumerate(i for i, body in enumerate(scene["bodies"]) if body["mass"] > 0)}
+    movable = np.array([body["mass"] > 0 for body in scene["bodies"]])
+    positions, orientations = (np.array([body[key] for body in scene["bodies"]], float)
+                               for key in ("position", "orientation"))
+    positions[movable], orientations[movable] = states[0], states[1]
     ends = []
     for body, anchor in (("a", "anchor_a"), ("b", "anchor_b")):
-        rows = [row[joint[body]] for joint in scene["joints"]]
-        ends.append(states[0][rows] + rotate(states[1][rows], np.array([joint[anchor] for joint in scene["joints"]])))
+        rows = [joint[body] for joint in scene["joints"]]
+        ends.append(positions[rows] + rotate(orientations[rows], np.array([joint[anchor] for joint in scene["joints"]])))
     return float(np.max(np.linalg.norm(ends[0] - ends[1], axis=1)))
 
 

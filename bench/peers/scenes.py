@@ -148,6 +148,20 @@ def ragdolls(figures=100):
     return scene(bodies, joints)
 
 
+def net(n=100):
+    """A net of n x n balls, each of which has ball joints with its neighbours, held at three balls of one side."""
+    bodies, joints = [], []
+    held = (0, n // 2, n - 1)
+    for row, column in itertools.product(range(n), repeat=2):
+        is_held = row == 0 and column in held
+        bodies.append(solid({"type": "sphere", "radius": 0.4}, (column, 0, row), mass=0 if is_held else None))
+        i = len(bodies) - 1
+        for has_neighbor, b, axis in ((column > 0, i - 1, (0.5, 0, 0)), (row > 0, i - n, (0, 0, 0.5))):
+            if has_neighbor:
+                joints.append({"type": "ball", "a": i, "b": b, "anchor_a": [-x for x in axis], "anchor_b": list(axis)})
+    return scene(bodies, joints)
+
+
 def to_body_axes(v, along_x):
     """The vector in the axes of a limb, which is turned by 90 degrees about z if it lies along x."""
     return [float(v[1]), float(-v[0]), float(v[2])] if along_x else [float(c) for c in v]
@@ -184,5 +198,6 @@ SCENES = {
     "pit": (pit, "1,728 boxes fall into a pit"),
     "hulls": (hulls, "1,000 convex hulls fall into a pit"),
     "ragdolls": (ragdolls, "100 figures of 11 capsules with ball joints"),
+    "net": (net, "net of 10,000 balls with 19,800 ball joints"),
     "terrain": (terrain, "500 balls and 500 boxes on 3,200 triangles"),
 }

@@ -44,6 +44,8 @@ class World:
         self.bodies = scene["bodies"]
         self.children, self.anchors, roots = {}, {}, []
         for joint in scene["joints"]:
+            if joint["a"] in self.anchors:
+                raise ValueError("reduced coordinates have no loops of joints")
             self.children.setdefault(joint["b"], []).append(joint["a"])
             self.anchors[joint["a"]] = joint["anchor_a"]
         elements = []
