@@ -83,9 +83,11 @@ struct FrameSweep {
 using FrameSweepFunction = std::size_t (*)(const FrameSweep& sweep, std::size_t first,
                                            std::size_t last, std::uint32_t* left);
 
+/// Starts a step: computes the vectors of the bundles [first, last) that depend on orientations.
+using StartFrames = void (*)(const FrameSweep& sweep, std::size_t first, std::size_t last);
+
 struct FrameSweepKernels {
-  /// Starts a step: computes the vectors that depend on orientations.
-  FrameSweepFunction start;
+  StartFrames start;
   FrameSweepFunction warm_start;
   FrameSweepFunction solve[2];  ///< index 1: with bias
 };

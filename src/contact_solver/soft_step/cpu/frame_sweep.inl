@@ -643,29 +643,35 @@ class FrameLanes {
   Matrix angular_response_;
 };
 
+/// Calls one(rows) for the rows of a bundle. @returns one bit per row that is skipped
+template <class S, bool kFixed, class One>
+unsigned for_frames(const FrameSweep& sweep, std::size_t bundle, unsigned lanes, const One& one) {
+  const FrameNumbers& numbers = sweep.numbers[bundle];
+  const unsigned solved = lanes & numbers.used & ~numbers.left;
+  if ((solved & numbers.has_axes) != 0) {
+    FrameLanes<S, kFixed, true> rows(sweep, bundle, solved);
+    one(&rows);
+  } else if (solved != 0) {
+    FrameLanes<S, kFixed, false> rows(sweep, bundle, solved);
+    one(&rows);
+  }
+  return lanes & numbers.left;
+}
+
 /// Calls one(rows) for all bundles of the rows [first, last). @returns as FrameSweepFunction
 template <class S, bool kFixed, class One>
 std::size_t for_each_frame_bundle(const FrameSweep& sweep, std::size_t first, std::size_t last,
                                   std::uint32_t* left, const One& one) {
   return for_each_bundle(first, last, left, [&](std::size_t bundle, unsigned lanes) {
-    const FrameNumbers& numbers = sweep.numbers[bundle];
-    const unsigned solved = lanes & numbers.used & ~numbers.left;
-    if ((solved & numbers.has_axes) != 0) {
-      FrameLanes<S, kFixed, true> rows(sweep, bundle, solved);
-      one(&rows);
-    } else if (solved != 0) {
-      FrameLanes<S, kFixed, false> rows(sweep, bundle, solved);
-      one(&rows);
-    }
-    return lanes & numbers.left;
+    return for_frames<S, kFixed>(sweep, bundle, lanes, one);
   });
 }
 
 template <class S, bool kFixed>
-std::size_t start_frames(const FrameSweep& sweep, std::size_t first, std::size_t last,
-                         std::uint32_t* left) {
-  return for_each_frame_bundle<S, kFixed>(sweep, first, last, left,
-                                          [](auto* rows) { rows->start(); });
+void start_frames(const FrameSweep& sweep, std::size_t first, std::size_t last) {
+  for (std::size_t bundle = first; bundle < last; ++bundle) {
+    for_frames<S, kFixed>(sweep, bundle, ~0u, [](auto* rows) { rows->start(); });
+  }
 }
 
 template <class S, bool kFixed>

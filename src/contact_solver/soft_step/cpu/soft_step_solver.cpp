@@ -468,12 +468,13 @@ cpu::ManifoldSetup SoftStepSolver::manifold_setup() {
           .least_determinant = kLeastDeterminant};
 }
 
-/// Calls f(is_fixed, first, last) for parts of the aligned rows [first, last): those with and
+/// Calls f(is_fixed, first, last) for parts of the bundles [first, last): those of rows with and
 /// without fixed bodies.
 template <class F>
 void SoftStepSolver::for_fixed_and_others(const RowTable& table, std::size_t first,
                                           std::size_t last, const F& f) {
-  const std::size_t fixed = table.begin(table.fixed(0)), overflow = table.begin(table.overflow());
+  const std::size_t fixed = table.begin(table.fixed(0)) / cpu::kBundle;
+  const std::size_t overflow = table.begin(table.overflow()) / cpu::kBundle;
   const auto call = [&](bool is_fixed, std::size_t begin, std::size_t end) {
     if (begin < end) f(is_fixed, begin, end);
   };
@@ -507,10 +508,9 @@ void SoftStepSolver::complete_manifolds() {
                                    kWhat);
   const cpu::ManifoldSetup setup = manifold_setup();
   parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
-    for_fixed_and_others(table, first * cpu::kBundle, last * cpu::kBundle,
+    for_fixed_and_others(table, first, last,
                          [&](bool is_fixed, std::size_t begin, std::size_t end) {
-                           cpu::kAvx2ManifoldSweep[is_fixed ? 1 : 0].complete(
-                               setup, begin / cpu::kBundle, end / cpu::kBundle);
+                           cpu::kAvx2ManifoldSweep[is_fixed ? 1 : 0].complete(setup, begin, end);
                          });
   });
   is_packed_ = true;
@@ -559,14 +559,10 @@ void SoftStepSolver::pack_frames() {
   const cpu::FrameSweep sweep = frame_sweep();
   parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
     for (std::size_t bundle = first; bundle < last; ++bundle) pack_bundle(sweep, bundle);
-    const auto start = [&](bool is_fixed, std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; i += kRowsPerKernel) {
-        std::array<std::uint32_t, kRowsPerKernel> left;
-        cpu::kAvx2FrameSweep[is_fixed ? 1 : 0].start(sweep, i, std::min(i + kRowsPerKernel, end),
-                                                     left.data());
-      }
-    };
-    for_fixed_and_others(all.table, first * cpu::kBundle, last * cpu::kBundle, start);
+    for_fixed_and_others(all.table, first, last,
+                         [&](bool is_fixed, std::size_t begin, std::size_t end) {
+                           cpu::kAvx2FrameSweep[is_fixed ? 1 : 0].start(sweep, begin, end);
+                         });
   });
 #endif
 }
