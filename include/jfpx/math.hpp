@@ -23,14 +23,14 @@ inline constexpr Real kMaxReal = (std::numeric_limits<Real>::max)();  // not the
 inline constexpr Real kPi = static_cast<Real>(3.14159265358979323846);
 
 /// Correctly rounded square root, with the same bits from nvcc and the host compilers.
-JFPX_HD inline float square_root(float x) {
+JFPX_INLINE inline float square_root(float x) {
 #if defined(__CUDA_ARCH__)
   return ::sqrt(x);
 #else
   return std::sqrt(x);
 #endif
 }
-JFPX_HD inline double square_root(double x) {
+JFPX_INLINE inline double square_root(double x) {
 #if defined(__CUDA_ARCH__)
   return ::sqrt(x);
 #elif defined(__MINGW32__) && defined(__x86_64__)
@@ -43,10 +43,10 @@ JFPX_HD inline double square_root(double x) {
 #endif
 }
 template <std::integral Integer>
-JFPX_HD inline Real square_root(Integer x) {
+JFPX_INLINE inline Real square_root(Integer x) {
   return square_root(static_cast<Real>(x));
 }
-JFPX_HD inline Real absolute(Real x) {
+JFPX_INLINE inline Real absolute(Real x) {
 #if defined(__CUDA_ARCH__)
   return ::fabs(x);
 #else
@@ -58,45 +58,45 @@ JFPX_HD inline Real absolute(Real x) {
 struct Vec3 {
   Real x = 0, y = 0, z = 0;
 
-  JFPX_HD constexpr Real& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
-  JFPX_HD constexpr const Real& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
-  JFPX_HD constexpr Vec3& operator+=(const Vec3& v) {
+  JFPX_INLINE constexpr Real& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+  JFPX_INLINE constexpr const Real& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
+  JFPX_INLINE constexpr Vec3& operator+=(const Vec3& v) {
     x += v.x, y += v.y, z += v.z;
     return *this;
   }
-  JFPX_HD constexpr Vec3& operator-=(const Vec3& v) {
+  JFPX_INLINE constexpr Vec3& operator-=(const Vec3& v) {
     x -= v.x, y -= v.y, z -= v.z;
     return *this;
   }
-  JFPX_HD constexpr Vec3& operator*=(Real s) {
+  JFPX_INLINE constexpr Vec3& operator*=(Real s) {
     x *= s, y *= s, z *= s;
     return *this;
   }
   friend bool operator==(const Vec3&, const Vec3&) = default;
 };
 
-JFPX_HD constexpr Vec3 operator+(Vec3 a, const Vec3& b) { return a += b; }
-JFPX_HD constexpr Vec3 operator-(Vec3 a, const Vec3& b) { return a -= b; }
-JFPX_HD constexpr Vec3 operator-(const Vec3& v) { return {-v.x, -v.y, -v.z}; }
-JFPX_HD constexpr Vec3 operator*(Vec3 v, Real s) { return v *= s; }
-JFPX_HD constexpr Vec3 operator*(Real s, Vec3 v) { return v *= s; }
+JFPX_INLINE constexpr Vec3 operator+(Vec3 a, const Vec3& b) { return a += b; }
+JFPX_INLINE constexpr Vec3 operator-(Vec3 a, const Vec3& b) { return a -= b; }
+JFPX_INLINE constexpr Vec3 operator-(const Vec3& v) { return {-v.x, -v.y, -v.z}; }
+JFPX_INLINE constexpr Vec3 operator*(Vec3 v, Real s) { return v *= s; }
+JFPX_INLINE constexpr Vec3 operator*(Real s, Vec3 v) { return v *= s; }
 
 /// a.x*b.x + a.y*b.y + a.z*b.z, summed from left to right.
-JFPX_HD constexpr Real dot(const Vec3& a, const Vec3& b) {
+JFPX_INLINE constexpr Real dot(const Vec3& a, const Vec3& b) {
   return (a.x * b.x + a.y * b.y) + a.z * b.z;
 }
-JFPX_HD constexpr Vec3 cross(const Vec3& a, const Vec3& b) {
+JFPX_INLINE constexpr Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-JFPX_HD constexpr Vec3 component_product(const Vec3& a, const Vec3& b) {
+JFPX_INLINE constexpr Vec3 component_product(const Vec3& a, const Vec3& b) {
   return {a.x * b.x, a.y * b.y, a.z * b.z};
 }
 /// v + direction * scale
-JFPX_HD constexpr Vec3 add_scaled(const Vec3& v, const Vec3& direction, Real scale) {
+JFPX_INLINE constexpr Vec3 add_scaled(const Vec3& v, const Vec3& direction, Real scale) {
   return v + direction * scale;
 }
-JFPX_HD constexpr Real length_squared(const Vec3& v) { return dot(v, v); }
-JFPX_HD inline Real length(const Vec3& v) { return square_root(length_squared(v)); }
+JFPX_INLINE constexpr Real length_squared(const Vec3& v) { return dot(v, v); }
+JFPX_INLINE inline Real length(const Vec3& v) { return square_root(length_squared(v)); }
 /// v scaled to length 1. A vector of length kEpsilon or less has no direction and is returned
 /// unchanged.
 JFPX_HD inline Vec3 normalized(const Vec3& v) {
@@ -115,13 +115,13 @@ struct Quat {
 };
 
 /// Hamilton product: the rotation b followed by the rotation a.
-JFPX_HD constexpr Quat operator*(const Quat& a, const Quat& b) {
+JFPX_INLINE constexpr Quat operator*(const Quat& a, const Quat& b) {
   return {
       a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
-JFPX_HD constexpr Quat conjugate(const Quat& q) { return {q.w, -q.x, -q.y, -q.z}; }
-JFPX_HD constexpr Real length_squared(const Quat& q) {
+JFPX_INLINE constexpr Quat conjugate(const Quat& q) { return {q.w, -q.x, -q.y, -q.z}; }
+JFPX_INLINE constexpr Real length_squared(const Quat& q) {
   return q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
 }
 /// q scaled to length 1; the identity if the length is kEpsilon or less (erratum E24).
@@ -133,7 +133,7 @@ JFPX_HD inline Quat normalized(const Quat& q) {
 }
 /// q rotated by the rotation vector `scale * omega` (world frame, [rad]) to first order, not
 /// normalised: q + (scale/2) * omega * q (thesis 4.2.2).
-JFPX_HD constexpr Quat add_scaled(const Quat& q, const Vec3& omega, Real scale) {
+JFPX_INLINE constexpr Quat add_scaled(const Quat& q, const Vec3& omega, Real scale) {
   const Quat t = Quat{0, omega.x * scale, omega.y * scale, omega.z * scale} * q;
   const Real half = Real(0.5);
   return {q.w + t.w * half, q.x + t.x * half, q.y + t.y * half, q.z + t.z * half};
@@ -165,44 +165,46 @@ JFPX_API Quat axes_along(const Vec3& x, const Vec3& y);
 struct Mat3 {
   Vec3 row[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-  JFPX_HD constexpr Real operator()(int r, int c) const { return row[r][c]; }
-  JFPX_HD constexpr Real& operator()(int r, int c) { return row[r][c]; }
-  JFPX_HD constexpr Vec3 column(int c) const { return {row[0][c], row[1][c], row[2][c]}; }
+  JFPX_INLINE constexpr Real operator()(int r, int c) const { return row[r][c]; }
+  JFPX_INLINE constexpr Real& operator()(int r, int c) { return row[r][c]; }
+  JFPX_INLINE constexpr Vec3 column(int c) const { return {row[0][c], row[1][c], row[2][c]}; }
   friend bool operator==(const Mat3&, const Mat3&) = default;
 };
 
-JFPX_HD constexpr Mat3 diagonal(const Vec3& d) { return {{{d.x, 0, 0}, {0, d.y, 0}, {0, 0, d.z}}}; }
-JFPX_HD constexpr Mat3 from_columns(const Vec3& a, const Vec3& b, const Vec3& c) {
+JFPX_INLINE constexpr Mat3 diagonal(const Vec3& d) {
+  return {{{d.x, 0, 0}, {0, d.y, 0}, {0, 0, d.z}}};
+}
+JFPX_INLINE constexpr Mat3 from_columns(const Vec3& a, const Vec3& b, const Vec3& c) {
   return {{{a.x, b.x, c.x}, {a.y, b.y, c.y}, {a.z, b.z, c.z}}};
 }
 /// The matrix S with S*v = cross(u, v) for every v.
-JFPX_HD constexpr Mat3 skew_symmetric(const Vec3& u) {
+JFPX_INLINE constexpr Mat3 skew_symmetric(const Vec3& u) {
   return {{{0, -u.z, u.y}, {u.z, 0, -u.x}, {-u.y, u.x, 0}}};
 }
-JFPX_HD constexpr Mat3 transposed(const Mat3& m) {
+JFPX_INLINE constexpr Mat3 transposed(const Mat3& m) {
   return {{m.column(0), m.column(1), m.column(2)}};
 }
-JFPX_HD constexpr Vec3 operator*(const Mat3& m, const Vec3& v) {
+JFPX_INLINE constexpr Vec3 operator*(const Mat3& m, const Vec3& v) {
   return {dot(m.row[0], v), dot(m.row[1], v), dot(m.row[2], v)};
 }
 /// transposed(m) * v
-JFPX_HD constexpr Vec3 transform_transpose(const Mat3& m, const Vec3& v) {
+JFPX_INLINE constexpr Vec3 transform_transpose(const Mat3& m, const Vec3& v) {
   return {dot(m.column(0), v), dot(m.column(1), v), dot(m.column(2), v)};
 }
-JFPX_HD constexpr Mat3 operator*(const Mat3& a, const Mat3& b) {
+JFPX_INLINE constexpr Mat3 operator*(const Mat3& a, const Mat3& b) {
   return from_columns(a * b.column(0), a * b.column(1), a * b.column(2));
 }
-JFPX_HD constexpr Mat3 operator*(const Mat3& m, Real s) {
+JFPX_INLINE constexpr Mat3 operator*(const Mat3& m, Real s) {
   return {{m.row[0] * s, m.row[1] * s, m.row[2] * s}};
 }
-JFPX_HD constexpr Mat3 operator+(const Mat3& a, const Mat3& b) {
+JFPX_INLINE constexpr Mat3 operator+(const Mat3& a, const Mat3& b) {
   return {{a.row[0] + b.row[0], a.row[1] + b.row[1], a.row[2] + b.row[2]}};
 }
 /// Linear interpolation of each entry: a for t = 0, b for t = 1.
-JFPX_HD constexpr Mat3 interpolate(const Mat3& a, const Mat3& b, Real t) {
+JFPX_INLINE constexpr Mat3 interpolate(const Mat3& a, const Mat3& b, Real t) {
   return a * (Real(1) - t) + b * t;
 }
-JFPX_HD constexpr Real determinant(const Mat3& m) {
+JFPX_INLINE constexpr Real determinant(const Mat3& m) {
   return dot(m.row[0], cross(m.row[1], m.row[2]));
 }
 /// inverse(m) for device code: writes it to *out. If m is singular, returns false and leaves *out
@@ -222,7 +224,7 @@ inline std::optional<Mat3> inverse(const Mat3& m) {
   return invert(m, &result) ? std::optional(result) : std::nullopt;
 }
 /// Rotation matrix of a unit quaternion: R*v = q v q* (erratum E14 was the transpose).
-JFPX_HD constexpr Mat3 to_matrix(const Quat& q) {
+JFPX_INLINE constexpr Mat3 to_matrix(const Quat& q) {
   const Real x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
   const Real xx = q.x * x2, yy = q.y * y2, zz = q.z * z2;
   const Real xy = q.x * y2, xz = q.x * z2, yz = q.y * z2;
@@ -232,7 +234,7 @@ JFPX_HD constexpr Mat3 to_matrix(const Quat& q) {
            {xz - wy, yz + wx, 1 - (xx + yy)}}};
 }
 /// The vector v rotated by the unit quaternion q.
-JFPX_HD constexpr Vec3 rotate(const Quat& q, const Vec3& v) { return to_matrix(q) * v; }
+JFPX_INLINE constexpr Vec3 rotate(const Quat& q, const Vec3& v) { return to_matrix(q) * v; }
 
 /// A rigid transform: p -> basis * p + origin, with an orthonormal basis. The default is the
 /// identity.
@@ -241,27 +243,27 @@ struct Transform {
   Vec3 origin;
   friend bool operator==(const Transform&, const Transform&) = default;
 };
-JFPX_HD constexpr Transform make_transform(const Quat& q, const Vec3& origin) {
+JFPX_INLINE constexpr Transform make_transform(const Quat& q, const Vec3& origin) {
   return {to_matrix(q), origin};
 }
-JFPX_HD constexpr Vec3 transform_point(const Transform& t, const Vec3& p) {
+JFPX_INLINE constexpr Vec3 transform_point(const Transform& t, const Vec3& p) {
   return t.basis * p + t.origin;
 }
-JFPX_HD constexpr Vec3 inverse_transform_point(const Transform& t, const Vec3& p) {
+JFPX_INLINE constexpr Vec3 inverse_transform_point(const Transform& t, const Vec3& p) {
   return transform_transpose(t.basis, p - t.origin);
 }
-JFPX_HD constexpr Vec3 transform_direction(const Transform& t, const Vec3& d) {
+JFPX_INLINE constexpr Vec3 transform_direction(const Transform& t, const Vec3& d) {
   return t.basis * d;
 }
-JFPX_HD constexpr Vec3 inverse_transform_direction(const Transform& t, const Vec3& d) {
+JFPX_INLINE constexpr Vec3 inverse_transform_direction(const Transform& t, const Vec3& d) {
   return transform_transpose(t.basis, d);
 }
 /// Composition: the transform b followed by the transform a.
-JFPX_HD constexpr Transform operator*(const Transform& a, const Transform& b) {
+JFPX_INLINE constexpr Transform operator*(const Transform& a, const Transform& b) {
   return {a.basis * b.basis, transform_point(a, b.origin)};
 }
 /// Inverse of a rigid transform.
-JFPX_HD constexpr Transform inverse(const Transform& t) {
+JFPX_INLINE constexpr Transform inverse(const Transform& t) {
   return {transposed(t.basis), -transform_transpose(t.basis, t.origin)};
 }
 
