@@ -3,6 +3,10 @@
 
 #include <jfpx/math.hpp>
 
+#if !defined(__CUDACC__)
+#include "src/base/real_lanes.hpp"
+#endif
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -28,6 +32,30 @@ struct alignas(64) TreeBlock {
       lower[i][lane] = bounds.lower[i];
       upper[i][lane] = bounds.upper[i];
     }
+  }
+  /// The lanes whose bounds overlap a box, one bit each.
+  JFPX_HD std::uint32_t overlapping_lanes(const Aabb& box) const {
+    std::uint32_t lanes = 0;
+#if defined(__CUDACC__)
+    for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+      bool is_gap = false;
+      for (int i = 0; i < 3; ++i) {
+        is_gap |= lower[i][lane] > box.upper[i];
+        is_gap |= upper[i][lane] < box.lower[i];
+      }
+      lanes |= is_gap ? 0 : 1u << lane;
+    }
+#else
+    for (std::uint32_t lane = 0; lane < kWidth; lane += cpu::kRealLanes) {
+      const auto overlap = [&](int i) {
+        return cpu::both(
+            cpu::not_greater(cpu::load_lanes(lower[i] + lane), cpu::set_lanes(box.upper[i])),
+            cpu::not_greater(cpu::set_lanes(box.lower[i]), cpu::load_lanes(upper[i] + lane)));
+      };
+      lanes |= cpu::bits(cpu::both(cpu::both(overlap(0), overlap(1)), overlap(2))) << lane;
+    }
+#endif
+    return lanes;
   }
   /// Bounds of all lanes.
   JFPX_HD Aabb bounds() const {
@@ -68,18 +96,11 @@ struct BlockTreeView {
     while (count > 0) {
       const std::uint32_t index = waiting[--count];
       const TreeBlock& block = blocks[index];
-      std::int32_t gaps[kWidth] = {};
-      for (int i = 0; i < 3; ++i) {
-        const Real lower = box.lower[i], upper = box.upper[i];
-        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-          gaps[lane] |= block.lower[i][lane] > upper ? 1 : 0;
-          gaps[lane] |= block.upper[i][lane] < lower ? 1 : 0;
-        }
-      }
+      const std::uint32_t overlapping = block.overlapping_lanes(box);
       const bool is_leaf = index < leaf_blocks;
       const std::uint32_t first = (is_leaf ? index : index - leaf_blocks) * kWidth;
       for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
-        if (gaps[lane] != 0) continue;
+        if ((overlapping >> lane & 1) == 0) continue;
         if (is_leaf) {
           visit(items[first + lane]);
         } else {
