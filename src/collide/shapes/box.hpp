@@ -99,7 +99,7 @@ JFPX_HD inline Submerged submerged(const Box& box, const Mat3& basis, const Half
 }
 
 /// Vector from the closest point of a box to a point, in the axes of the box; zero inside.
-JFPX_HD inline Vec3 offset_from_box(const Vec3& point, const Box& box) {
+JFPX_INLINE inline Vec3 offset_from_box(const Vec3& point, const Box& box) {
   Vec3 offset;
   for (int i = 0; i < 3; ++i) {
     const Real h = box.half_extents[i];
