@@ -20,7 +20,17 @@ struct PolyhedronPair {
   Real size;    ///< [m], the scale of the rounding errors
 
   JFPX_HD Vec3 vertex_of_b(int i) const { return rotation * b.vertex(i) + offset; }
+  /// The centre of b in the axes of a.
+  JFPX_HD Vec3 centre_of_b() const { return rotation * b.centre() + offset; }
+  /// The centre of a in the axes of b.
+  JFPX_HD Vec3 centre_of_a() const { return transform_transpose(rotation, a.centre() - offset); }
 };
+
+/// [m], height of a point above the plane of a face.
+template <class P>
+JFPX_HD Real height_above(const P& polyhedron, int face, const Vec3& point) {
+  return dot(polyhedron.face_normal(face), point) - polyhedron.face_offset(face);
+}
 
 /// The axis of a contact: a face of a, a face of b, or an edge of each.
 struct PolyhedronAxis {
@@ -41,8 +51,7 @@ JFPX_HD inline const PolyhedronAxis& preferred(const PolyhedronAxis& first,
 /// separates most polyhedra that are not close.
 template <class A, class B>
 JFPX_HD bool are_far_apart(const PolyhedronPair<A, B>& pair, Real limit) {
-  const Vec3 centre_b = pair.rotation * pair.b.centre() + pair.offset;
-  const Vec3 line = centre_b - pair.a.centre();
+  const Vec3 line = pair.centre_of_b() - pair.a.centre();
   const Real distance = length(line);
   if (!(distance > 0)) return false;
   const Vec3 n = line * (Real(1) / distance);
@@ -59,54 +68,80 @@ JFPX_HD inline bool is_beaten(const PolyhedronAxis& best, Real height, Real inne
          height - inner_radius + error <= best.overlap.distance;
 }
 
-/// The face of a with the largest separation. @returns false if it is above `limit`
-template <class A, class B>
-JFPX_HD bool test_faces_of_a(const PolyhedronPair<A, B>& pair, Real error, Real limit,
-                             PolyhedronAxis* best) {
-  const Vec3 centre_b = pair.rotation * pair.b.centre() + pair.offset;
-  const Real inner_radius = pair.b.inner_radius();
-  for (int i = 0; i < pair.a.face_count(); ++i) {
-    const Vec3 n = pair.a.face_normal(i);
-    const Real height = dot(n, centre_b) - pair.a.face_offset(i);
-    if (is_beaten(*best, height, inner_radius, error)) continue;
-    const Real reach = pair.b.support(-transform_transpose(pair.rotation, n));
-    const Real distance = dot(n, pair.offset) - reach - pair.a.face_offset(i);
-    if (distance > limit) return false;
-    if (best->kind == PolyhedronAxis::none || distance > best->overlap.distance) {
-      *best = {PolyhedronAxis::face_of_a, i, 0, {0, distance, error, -n}};
+/// Replaces *best by the face with the largest separation, if this is larger. Of equal faces of
+/// `kind`, the first counts. The face that is farthest below the centre of the other polyhedron is
+/// tested first, because it beats most of the others.
+/// @param height_of     function of a face: [m], height of the centre of the other polyhedron
+/// @param separation_of function of a face: LeastOverlap
+/// @returns false if a separation is above `limit`
+template <class HeightOf, class SeparationOf>
+JFPX_HD bool test_faces(PolyhedronAxis::Kind kind, int count, Real inner_radius, Real error,
+                        Real limit, const HeightOf& height_of, const SeparationOf& separation_of,
+                        PolyhedronAxis* best) {
+  int first = 0;
+  Real highest = -kMaxReal;
+  for (int i = 0; i < count; ++i) {
+    const Real height = height_of(i);
+    if (height > highest) highest = height, first = i;
+  }
+  const auto test = [&](int i) {
+    const LeastOverlap overlap = separation_of(i);
+    const Real most = best->overlap.distance;
+    if (best->kind == PolyhedronAxis::none || overlap.distance > most ||
+        (overlap.distance == most && best->kind == kind && i < best->first)) {
+      *best = {kind, i, 0, overlap};
     }
+    return !(overlap.distance > limit);
+  };
+  if (is_beaten(*best, highest, inner_radius, error)) return true;
+  if (!test(first)) return false;
+  for (int i = 0; i < count; ++i) {
+    if (i == first || is_beaten(*best, height_of(i), inner_radius, error)) continue;
+    if (!test(i)) return false;
   }
   return true;
 }
 template <class A, class B>
+JFPX_HD bool test_faces_of_a(const PolyhedronPair<A, B>& pair, Real error, Real limit,
+                             PolyhedronAxis* best) {
+  const Vec3 centre_b = pair.centre_of_b();
+  const auto height_of = [&](int i) { return height_above(pair.a, i, centre_b); };
+  const auto separation_of = [&](int i) -> LeastOverlap {
+    const Vec3 n = pair.a.face_normal(i);
+    const Real reach = pair.b.support(-transform_transpose(pair.rotation, n));
+    return {0, dot(n, pair.offset) - reach - pair.a.face_offset(i), error, -n};
+  };
+  return test_faces(PolyhedronAxis::face_of_a, pair.a.face_count(), pair.b.inner_radius(), error,
+                    limit, height_of, separation_of, best);
+}
+template <class A, class B>
 JFPX_HD bool test_faces_of_b(const PolyhedronPair<A, B>& pair, Real error, Real limit,
                              PolyhedronAxis* best) {
-  const Vec3 centre_a = pair.a.centre() - pair.offset;
-  const Real inner_radius = pair.a.inner_radius();
-  for (int i = 0; i < pair.b.face_count(); ++i) {
+  const Vec3 centre_a = pair.centre_of_a();
+  const auto height_of = [&](int i) { return height_above(pair.b, i, centre_a); };
+  const auto separation_of = [&](int i) -> LeastOverlap {
     const Vec3 n = pair.rotation * pair.b.face_normal(i);
-    const Real height = dot(n, centre_a) - pair.b.face_offset(i);
-    if (is_beaten(*best, height, inner_radius, error)) continue;
-    const Real distance = -dot(n, pair.offset) - pair.a.support(-n) - pair.b.face_offset(i);
-    if (distance > limit) return false;
-    if (best->kind == PolyhedronAxis::none || distance > best->overlap.distance) {
-      *best = {PolyhedronAxis::face_of_b, i, 0, {0, distance, error, n}};
-    }
-  }
-  return true;
+    return {0, -dot(n, pair.offset) - pair.a.support(-n) - pair.b.face_offset(i), error, n};
+  };
+  return test_faces(PolyhedronAxis::face_of_b, pair.b.face_count(), pair.a.inner_radius(), error,
+                    limit, height_of, separation_of, best);
 }
 
 /// Whether an edge cannot belong to an axis with a separation above `least`: along every outward
 /// normal n of the edge, the other polyhedron reaches back at least to its inner ball. The normals
 /// are on the arc between those of the two faces, whose largest product with a vector exceeds those
-/// of its ends by at most 1 / cos(half the angle).
-/// @param u,v     outward normals of the faces
-/// @param to_edge from the centre of the other polyhedron's inner ball to the edge
-JFPX_HD inline bool faces_away(const Vec3& u, const Vec3& v, const Vec3& to_edge, Real inner_radius,
-                               Real least, Real error) {
+/// of its ends by at most 1 / cos(half the angle). The vertices of a hull are at most
+/// 32 kEpsilon times its size, which is less than 4 * error, behind the planes of their faces.
+/// @param centre of the other polyhedron, in the axes of the first
+template <class P>
+JFPX_HD bool faces_away(const P& polyhedron, const PolyhedronEdge& edge, const Vec3& centre,
+                        Real inner_radius, Real least, Real error) {
   const Real reach = least + inner_radius - 4 * error;
   if (!(reach > 0)) return false;
-  const Real p = -dot(u, to_edge), q = -dot(v, to_edge), most = p > q ? p : q;
+  const Real p = height_above(polyhedron, edge.face, centre);
+  const Real q = height_above(polyhedron, edge.other_face, centre);
+  const Real most = (p > q ? p : q) + 4 * error;
+  const Vec3 u = polyhedron.face_normal(edge.face), v = polyhedron.face_normal(edge.other_face);
   const Real cosine2 = (1 + dot(u, v)) * Real(0.5);  // of half the angle
   return most < 0 || most * most < reach * reach * cosine2 * (1 - 16 * kEpsilon);
 }
@@ -119,20 +154,17 @@ JFPX_HD bool test_edges(const PolyhedronPair<A, B>& pair, Real error, Real least
                         PolyhedronAxis* best) {
   std::uint16_t edges_of_a[Hull::kMaxEdges];
   int count = 0;
-  const Vec3 centre_b = pair.rotation * pair.b.centre() + pair.offset;
+  const Vec3 centre_b = pair.centre_of_b(), centre_a = pair.centre_of_a();
   for (int i = 0; i < pair.a.edge_count(); ++i) {
-    const PolyhedronEdge edge = pair.a.edge(i);
-    if (!faces_away(pair.a.face_normal(edge.face), pair.a.face_normal(edge.other_face),
-                    pair.a.vertex(edge.a) - centre_b, pair.b.inner_radius(), least, error)) {
-      edges_of_a[count++] = static_cast<std::uint16_t>(i);
-    }
+    if (faces_away(pair.a, pair.a.edge(i), centre_b, pair.b.inner_radius(), least, error)) continue;
+    edges_of_a[count++] = static_cast<std::uint16_t>(i);
   }
   for (int k = 0; k < pair.b.edge_count(); ++k) {
     const PolyhedronEdge eb = pair.b.edge(k);
+    if (faces_away(pair.b, eb, centre_a, pair.a.inner_radius(), least, error)) continue;
     const Vec3 pb = pair.vertex_of_b(eb.a);
     const Vec3 c = -(pair.rotation * pair.b.face_normal(eb.face));
     const Vec3 d = -(pair.rotation * pair.b.face_normal(eb.other_face));
-    if (faces_away(-c, -d, pb - pair.a.centre(), pair.a.inner_radius(), least, error)) continue;
     const Vec3 along_b = pair.vertex_of_b(eb.b) - pb, dc = cross(d, c);
     const Real size_b = length_squared(along_b);
     for (int m = 0; m < count; ++m) {
@@ -161,6 +193,23 @@ JFPX_HD bool test_edges(const PolyhedronPair<A, B>& pair, Real error, Real least
   return true;
 }
 
+/// The axes that are found by tests.
+struct TestedAxes {
+  PolyhedronAxis of_a;
+  PolyhedronAxis widest;  ///< of_a, or a face of b with a larger separation
+  PolyhedronAxis edges;
+};
+
+/// False if an axis separates the polyhedra by more than `limit`.
+template <class A, class B>
+JFPX_HD bool test_axes(const PolyhedronPair<A, B>& pair, Real error, Real limit, TestedAxes* axes) {
+  if (are_far_apart(pair, limit)) return false;
+  if (!test_faces_of_a(pair, error, limit, &axes->of_a)) return false;
+  axes->widest = axes->of_a;
+  if (!test_faces_of_b(pair, error, limit, &axes->widest)) return false;
+  return test_edges(pair, error, axes->widest.overlap.distance, limit, &axes->edges);
+}
+
 /// The axes of a contact.
 struct PolyhedronAxes {
   PolyhedronAxis preferred;  ///< faces precede edges; steady for resting polyhedra
@@ -171,13 +220,12 @@ struct PolyhedronAxes {
 template <class A, class B>
 JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit, PolyhedronAxes* axes) {
   const Real error = 8 * kEpsilon * pair.size;
-  PolyhedronAxis of_a, of_b, edges;
-  if (are_far_apart(pair, limit)) return false;
-  if (!test_faces_of_a(pair, error, limit, &of_a)) return false;
-  if (!test_faces_of_b(pair, error, limit, &of_b)) return false;
-  axes->widest = of_b.overlap.distance > of_a.overlap.distance ? of_b : of_a;
-  if (!test_edges(pair, error, axes->widest.overlap.distance, limit, &edges)) return false;
-  const PolyhedronAxis& face = preferred(of_a, of_b);
+  TestedAxes tested;
+  if (!test_axes(pair, error, limit, &tested)) return false;
+  // A face of b that is not wider than the face of a is not preferred to it.
+  axes->widest = tested.widest;
+  const PolyhedronAxis& edges = tested.edges;
+  const PolyhedronAxis& face = preferred(tested.of_a, tested.widest);
   const bool is_face = &preferred_to_edges(face.overlap, edges.overlap) == &face.overlap;
   axes->preferred = edges.kind == PolyhedronAxis::none || is_face ? face : edges;
   if (edges.kind != PolyhedronAxis::none &&
