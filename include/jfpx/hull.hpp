@@ -37,6 +37,9 @@ struct HullView {
   const HullFace* faces = nullptr;
   const std::uint8_t* corners = nullptr;
   const HullEdge* edges = nullptr;
+  // For vectors of the CPU, null on a device: see PolyhedronColumns.
+  const Real* columns = nullptr;
+  const std::uint32_t* packed_edges = nullptr;
   std::uint32_t vertex_count = 0, face_count = 0, edge_count = 0, corner_count = 0;
   std::uint64_t serial = 0;   ///< unique in the process
   Vec3 half_extents;          ///< [m], of a box about the origin that encloses the hull
@@ -51,6 +54,8 @@ struct HullData {
   std::vector<HullFace> faces;
   std::vector<std::uint8_t> corners;
   std::vector<HullEdge> edges;
+  std::vector<Real> columns;
+  std::vector<std::uint32_t> packed_edges;
   Aabb bounds;
   double volume = 0;      ///< [m^3]
   double centre[3] = {};  ///< [m], centre of mass

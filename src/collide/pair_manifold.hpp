@@ -7,6 +7,9 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+namespace cpu {
+struct HullKernels;
+}
 namespace detail {
 
 /// A solid with its pose in the world.
@@ -23,10 +26,13 @@ struct PairMotion {
   /// [m], distance beyond which a box has no contact with a sphere or another box, whatever their
   /// motion.
   Real limit = kMaxReal;
-  Vec3 origin_a, origin_b;  ///< [m], centres of mass of the bodies
+  Vec3 origin_a, origin_b;                         ///< [m], centres of mass of the bodies
+  const cpu::HullKernels* hull_kernels = nullptr;  ///< null: scalar tests
 
   /// The motion of b relative to a.
-  JFPX_HD PairMotion flipped() const { return {-motion, margin, limit, origin_b, origin_a}; }
+  JFPX_HD PairMotion flipped() const {
+    return {-motion, margin, limit, origin_b, origin_a, hull_kernels};
+  }
 };
 
 /// A point of a manifold, as input of a solver.

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "src/collide/face_points.hpp"
-#include "src/collide/polyhedron.hpp"
+#include "src/collide/polyhedron_columns.hpp"
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -210,6 +210,36 @@ JFPX_HD bool test_axes(const PolyhedronPair<A, B>& pair, Real error, Real limit,
   return test_edges(pair, error, axes->widest.overlap.distance, limit, &axes->edges);
 }
 
+/// The same by kernels with vectors.
+template <class A, class B>
+bool test_axes(const PolyhedronPair<A, B>& pair, Real error, Real limit,
+               const cpu::HullKernels& kernels, TestedAxes* axes) {
+  const KernelInput<A> a(pair.a);
+  const KernelInput<B> b(pair.b);
+  const Vec3 *row = pair.rotation.row, &offset = pair.offset;
+  cpu::HullAxes found;
+  const bool may_meet = kernels.test_axes({a.input(),
+                                           b.input(),
+                                           {{row[0].x, row[0].y, row[0].z},
+                                            {row[1].x, row[1].y, row[1].z},
+                                            {row[2].x, row[2].y, row[2].z}},
+                                           {offset.x, offset.y, offset.z},
+                                           error,
+                                           limit},
+                                          &found);
+  if (!may_meet) return false;
+  const auto axis_of = [](const cpu::HullAxis& axis) -> PolyhedronAxis {
+    if (axis.kind == PolyhedronAxis::none) return {};
+    const Real* const n = axis.normal;
+    return {static_cast<PolyhedronAxis::Kind>(axis.kind),
+            axis.first,
+            axis.second,
+            {0, axis.distance, axis.error, {n[0], n[1], n[2]}}};
+  };
+  *axes = {axis_of(found.of_a), axis_of(found.widest), axis_of(found.edges)};
+  return true;
+}
+
 /// The axes of a contact.
 struct PolyhedronAxes {
   PolyhedronAxis preferred;  ///< faces precede edges; steady for resting polyhedra
@@ -217,11 +247,19 @@ struct PolyhedronAxes {
 };
 
 /// False if an axis separates the polyhedra by more than `limit`.
+/// @param kernels null for the scalar tests, which have the same results
 template <class A, class B>
-JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit, PolyhedronAxes* axes) {
+JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit,
+                       const cpu::HullKernels* kernels, PolyhedronAxes* axes) {
   const Real error = 8 * kEpsilon * pair.size;
   TestedAxes tested;
-  if (!test_axes(pair, error, limit, &tested)) return false;
+#if defined(__CUDA_ARCH__)
+  const bool may_meet = test_axes(pair, error, limit, &tested);
+#else
+  const bool may_meet = kernels != nullptr ? test_axes(pair, error, limit, *kernels, &tested)
+                                           : test_axes(pair, error, limit, &tested);
+#endif
+  if (!may_meet) return false;
   // A face of b that is not wider than the face of a is not preferred to it.
   axes->widest = tested.widest;
   const PolyhedronAxis& edges = tested.edges;

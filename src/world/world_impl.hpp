@@ -33,7 +33,7 @@ struct World::Impl {
       : pool(std::move(threads)),
         scene(settings_of(given)),
         store(empty_store(given)),
-        contact_finder(make_broad_phase(std::move(collider), broad_phase)),
+        contact_finder(make_broad_phase(std::move(collider), broad_phase), simd),
         soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd),
         worst_first(make_worst_first_step(given)) {
     store.reserve(given.bodies.size());

@@ -7,6 +7,7 @@ jfpx_add_test(collide_test INTERNAL SOURCES
   collide/heightfield_test.cpp
   collide/hull_contact_test.cpp
   collide/hull_faces_test.cpp
+  collide/hull_kernels_test.cpp
   collide/hull_test.cpp
   collide/pair_oracle_test.cpp
   collide/round_contact_test.cpp

@@ -5,6 +5,7 @@
 
 #include "src/collide/hull/hull_data.hpp"
 #include "src/collide/hull/reduction.hpp"
+#include "src/collide/polyhedron_columns.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -134,6 +135,11 @@ std::shared_ptr<const HullData> checked(const char* name, const HullData& data) 
   }
   auto shared = std::make_shared<HullData>(data);
   shared->view = view_of(*shared);
+  detail::PolyhedronColumns columns(detail::HullPolyhedron{&shared->view});
+  shared->columns = std::move(columns.columns);
+  shared->packed_edges = std::move(columns.edges);
+  shared->view.columns = shared->columns.data();
+  shared->view.packed_edges = shared->packed_edges.data();
   return shared;
 }
 

@@ -161,7 +161,7 @@ JFPX_HD void find_contact_of_polyhedra(const A& a, const Transform& pose_a, cons
   const auto separation_at = [&](Real part) -> Separation {
     polyhedra.offset =
         transform_transpose(pose_a.basis, pose_b.origin - moved(pose_a.origin, pair, part));
-    if (!find_axes(polyhedra, pair.limit, &axes)) return {{}, 0, false};
+    if (!find_axes(polyhedra, pair.limit, pair.hull_kernels, &axes)) return {{}, 0, false};
     const LeastOverlap& overlap = axes.preferred.overlap;
     return {pose_a.basis * overlap.normal, overlap.distance};
   };

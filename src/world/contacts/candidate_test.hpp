@@ -41,7 +41,8 @@ JFPX_HD inline void test_candidate(const SweptBounds& bounds, const Candidate& p
   // is more than rounding and the preference for an earlier axis change.
   const Real limit = (margin + length(motion)) * Real(1.1);
   find_contact(bounds.sub_shapes, pair.sub_shape_a, pair.sub_shape_b, pair.element, centre,
-               {motion, margin, limit, centre, bodies.position[pair.b]}, found);
+               {motion, margin, limit, centre, bodies.position[pair.b], bounds.hull_kernels},
+               found);
   if (bodies.sensor[pair.a] != 0 || bodies.sensor[pair.b] != 0) found->point_count = 0;
   if (is_recyclable && found->is_steady && found->point_count > 0) note_test(bodies, found);
 }

@@ -1,6 +1,7 @@
 /// Broad phase and pair tests of a world's contact detection.
 #include "src/world/contacts/contact_finder.hpp"
 
+#include "src/base/cpu.hpp"
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 #include "src/contact_solver/soft_step/contact_lookup.hpp"
@@ -73,7 +74,20 @@ void append(ThreadPool* pool, std::span<Part> parts, const List& list, Refilled<
   });
 }
 
+/// The kernels of hulls for the processor; null if there are none.
+const cpu::HullKernels* hull_kernels(SimdLevel simd) {
+#if defined(__x86_64__)
+  if (usable_simd_level(simd) >= SimdLevel::avx2) return &cpu::kAvx2HullKernels;
+#else
+  static_cast<void>(simd);
+#endif
+  return nullptr;
+}
+
 }  // namespace
+
+ContactFinder::ContactFinder(std::unique_ptr<BroadPhaseSearch> broad_phase, SimdLevel simd)
+    : broad_phase_(std::move(broad_phase)), hull_kernels_(hull_kernels(simd)) {}
 
 void ContactFinder::set_bodies(const BodyStore& bodies) {
   sub_shapes_.set_bodies(bodies);
@@ -94,7 +108,8 @@ void ContactFinder::start_bounds(const BodyStore& bodies, Real margin) {
                    .margins = margins_.data(),
                    .swept = swept_.data(),
                    .boxes = boxes_.data(),
-                   .largest_margin = margin * Real(0.5)};
+                   .largest_margin = margin * Real(0.5),
+                   .hull_kernels = hull_kernels_};
 }
 
 /// Computes the swept bounds of solids of mass 0 other than spheres, and their trees.

@@ -24,8 +24,8 @@ inline namespace JFPX_ABI {
 class ContactFinder {
  public:
   /// @param broad_phase not null
-  explicit ContactFinder(std::unique_ptr<BroadPhaseSearch> broad_phase)
-      : broad_phase_(std::move(broad_phase)) {}
+  /// @param simd widest vector instructions of the pair tests
+  ContactFinder(std::unique_ptr<BroadPhaseSearch> broad_phase, SimdLevel simd);
 
   /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
@@ -109,6 +109,7 @@ class ContactFinder {
                       const AppendAll& append_all);
 
   std::unique_ptr<BroadPhaseSearch> broad_phase_;
+  const cpu::HullKernels* hull_kernels_;
   SubShapeTable sub_shapes_;
   std::vector<Candidate> candidates_, merged_candidates_;
   FixedTrees fixed_trees_;

@@ -34,7 +34,8 @@ struct SweptBounds {
   /// By solid other than a sphere of a movable body, the first is SubShapeRanges::spheres(): bounds
   /// of the step's motion.
   Aabb* boxes = nullptr;
-  Real largest_margin = 0;  ///< [m]
+  Real largest_margin = 0;                         ///< [m]
+  const cpu::HullKernels* hull_kernels = nullptr;  ///< null on a device
 
   /// Fills swept[i] and boxes with a sphere and a box that enclose the motion of the sub-shape, and
   /// margins[i].

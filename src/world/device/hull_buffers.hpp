@@ -72,6 +72,8 @@ class HullBuffers {
     view.faces = fill(faces, hull.faces, hull.face_count);
     view.corners = fill(corners, hull.corners, hull.corner_count);
     view.edges = fill(edges, hull.edges, hull.edge_count);
+    view.columns = nullptr;
+    view.packed_edges = nullptr;
     std::memcpy(words.data(), &view, sizeof view);
     transfer.put(copy, words.data(), size);
     transfer.wait();

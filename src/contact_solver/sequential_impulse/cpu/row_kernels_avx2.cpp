@@ -1,5 +1,5 @@
 /// Kernels of the row solver for AVX2.
-#include "src/contact_solver/avx2_lanes.inl"
+#include "src/base/avx2_lanes.inl"
 #include "src/contact_solver/sequential_impulse/cpu/row_kernels.hpp"
 
 namespace jfpx {

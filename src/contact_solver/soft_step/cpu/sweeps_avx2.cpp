@@ -1,5 +1,5 @@
 /// Kernels of the sweeps, for AVX2.
-#include "src/contact_solver/avx2_lanes.inl"
+#include "src/base/avx2_lanes.inl"
 #include "src/contact_solver/soft_step/cpu/body_sweep.inl"
 #include "src/contact_solver/soft_step/cpu/frame_sweep.inl"
 #include "src/contact_solver/soft_step/cpu/manifold_setup.inl"
