@@ -171,6 +171,21 @@ TEST(Hull, IsAFunctionOfTheSetOfPoints) {
   }
 }
 
+TEST(Hull, EqualHullsShareTheirData) {
+  const test::Seed seed;
+  Random random(seed);
+  for (int n = 0; n < 300; ++n) {  // hulls of earlier rounds exist no longer
+    HullPoints points, other;
+    for (int i = 0; i < 12; ++i) points.push_back(random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    const Hull hull(points);
+    hull_shuffle(&points, &random);
+    EXPECT_EQ(&Hull(points).data(), &hull.data());
+    EXPECT_EQ(&Hull(hull.vertices(), face_lists(hull)).data(), &hull.data());
+    for (const Vec3& p : points) other.push_back(p * Real(1.25));
+    EXPECT_NE(&Hull(other).data(), &hull.data());
+  }
+}
+
 TEST(Hull, RoundingOfARotationDoesNotBendAGrid) {
   const test::Seed seed;
   Random random(seed);

@@ -3,6 +3,7 @@
 #include <jfpx/hull.hpp>
 #include <jfpx/scene.hpp>
 
+#include "src/base/hash64.hpp"
 #include "src/collide/hull/hull_data.hpp"
 #include "src/collide/hull/reduction.hpp"
 #include "src/collide/polyhedron_columns.hpp"
@@ -11,6 +12,8 @@
 #include <atomic>
 #include <charconv>
 #include <map>
+#include <memory>
+#include <mutex>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -126,6 +129,51 @@ HullView view_of(const HullData& data) {
   return view;
 }
 
+std::shared_ptr<const HullData> shared(const HullData& data) {
+  auto hull = std::make_shared<HullData>(data);
+  hull->view = view_of(*hull);
+  detail::PolyhedronColumns columns(detail::HullPolyhedron{&hull->view});
+  hull->columns = std::move(columns.columns);
+  hull->packed_edges = std::move(columns.edges);
+  hull->view.columns = hull->columns.data();
+  hull->view.packed_edges = hull->packed_edges.data();
+  return hull;
+}
+
+bool are_equal(const HullData& a, const HullData& b) {
+  return a.vertices == b.vertices && a.faces == b.faces && a.corners == b.corners &&
+         a.volume == b.volume && std::ranges::equal(a.centre, b.centre) &&
+         std::ranges::equal(a.spread, b.spread);
+}
+
+/// The hulls that exist. Equal hulls share their data, so that tests of many equal bodies find the
+/// data in the cache. Threads may use an object concurrently.
+class ExistingHulls {
+ public:
+  /// Returns the hull with these data, which is made if there is none.
+  std::shared_ptr<const HullData> get(const HullData& data) {
+    Hash64 hash;
+    hash.add_bytes(data.vertices.data(), data.vertices.size() * sizeof(Vec3));
+    const std::lock_guard lock(mutex_);
+    const auto [first, last] = hulls_.equal_range(hash.value());
+    for (auto i = first; i != last; ++i) {
+      if (auto hull = i->second.lock(); hull != nullptr && are_equal(*hull, data)) return hull;
+    }
+    if (hulls_.size() >= most_) {
+      std::erase_if(hulls_, [](const auto& item) { return item.second.expired(); });
+      most_ = std::max(most_, 2 * hulls_.size());
+    }
+    auto made = shared(data);
+    hulls_.emplace(hash.value(), made);
+    return made;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::multimap<std::uint64_t, std::weak_ptr<const HullData>> hulls_;  ///< by hash
+  std::size_t most_ = 64;  ///< size at which hulls that exist no longer are removed
+};
+
 std::shared_ptr<const HullData> checked(const char* name, const HullData& data) {
   constexpr double kLeast = std::numeric_limits<double>::min();
   if (!(data.volume >= kLeast)) {
@@ -133,14 +181,8 @@ std::shared_ptr<const HullData> checked(const char* name, const HullData& data) 
                           " to " + decimal(data.bounds.upper) +
                           "; it must be larger, so that its volume is a normal double");
   }
-  auto shared = std::make_shared<HullData>(data);
-  shared->view = view_of(*shared);
-  detail::PolyhedronColumns columns(detail::HullPolyhedron{&shared->view});
-  shared->columns = std::move(columns.columns);
-  shared->packed_edges = std::move(columns.edges);
-  shared->view.columns = shared->columns.data();
-  shared->view.packed_edges = shared->packed_edges.data();
-  return shared;
+  static ExistingHulls hulls;
+  return hulls.get(data);
 }
 
 /// The hull of vertices that are all significant, on the grid of these alone. Because the grid of
