@@ -4,7 +4,10 @@
 #pragma once
 
 #include "src/collide/face_points.hpp"
+#include "src/collide/polyhedron.hpp"
+#if !defined(__CUDACC__)
 #include "src/collide/polyhedron_columns.hpp"
+#endif
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -210,6 +213,7 @@ JFPX_HD bool test_axes(const PolyhedronPair<A, B>& pair, Real error, Real limit,
   return test_edges(pair, error, axes->widest.overlap.distance, limit, &axes->edges);
 }
 
+#if !defined(__CUDACC__)
 /// The same by kernels with vectors.
 template <class A, class B>
 bool test_axes(const PolyhedronPair<A, B>& pair, Real error, Real limit,
@@ -239,6 +243,7 @@ bool test_axes(const PolyhedronPair<A, B>& pair, Real error, Real limit,
   *axes = {axis_of(found.of_a), axis_of(found.widest), axis_of(found.edges)};
   return true;
 }
+#endif
 
 /// The axes of a contact.
 struct PolyhedronAxes {
@@ -253,7 +258,8 @@ JFPX_HD bool find_axes(const PolyhedronPair<A, B>& pair, Real limit,
                        const cpu::HullKernels* kernels, PolyhedronAxes* axes) {
   const Real error = 8 * kEpsilon * pair.size;
   TestedAxes tested;
-#if defined(__CUDA_ARCH__)
+#if defined(__CUDACC__)
+  static_cast<void>(kernels);
   const bool may_meet = test_axes(pair, error, limit, &tested);
 #else
   const bool may_meet = kernels != nullptr ? test_axes(pair, error, limit, *kernels, &tested)

@@ -10,19 +10,21 @@ namespace {
 
 using test::operator""_r;
 
-/// Balls and boxes that overlap, slide, rebound and roll in a room.
+/// Balls, boxes and hulls that overlap, slide, rebound and roll in a room.
 Scene random_bodies(Random* random, bool any_boxes) {
   Scene scene;
   scene.soft_step.substeps = 1 + static_cast<std::uint32_t>(random->below(5));
   const std::uint64_t count = 1 + random->below(any_boxes ? 150 : 300);
   const bool rebounds = random->below(2) == 0, rolls = random->below(4) == 0;
   const bool any_locks = random->below(3) == 0;
+  const bool any_hulls = any_boxes && random->below(2) == 0;
   for (std::uint64_t i = 0; i < count; ++i) {
     BodyDef def = test::heavy(random->uniform_in_box({-3, 0, -3}, {3, 8, 3}));
     def.shape = Sphere{random->uniform(0.2_r, 0.9_r)};
     if (any_boxes && random->below(3) != 0) {
       def.shape = Box{random->uniform_in_box({0.1_r, 0.1_r, 0.1_r}, {0.8_r, 0.8_r, 0.8_r})};
     }
+    if (any_hulls && random->below(2) == 0) def.shape = test::random_hull(random);
     def.mass = random->below(30) == 0 ? 0 : random->uniform(0.1_r, 10);
     def.friction = random->below(3) == 0 ? 0 : random->uniform(0, 1);
     if (def.mass > 0) {
