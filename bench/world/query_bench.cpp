@@ -102,6 +102,24 @@ void cast_short(benchmark::State& state, const char* scene) {
   }
 }
 
+/// The body that is closest to a point or a box among the bodies.
+void closest(benchmark::State& state, const char* scene, const SolidShape& shape) {
+  const World world = make_world(scene);
+  Rays rays(room_of(world));
+  for (auto _ : state) benchmark::DoNotOptimize(world.closest_body({rays.point(), shape}));
+}
+void closest_to_point(benchmark::State& state, const char* scene) {
+  closest(state, scene, Sphere{0});
+}
+void closest_to_box(benchmark::State& state, const char* scene) { closest(state, scene, Box{}); }
+void within(benchmark::State& state, const char* scene) {
+  const World world = make_world(scene);
+  Rays rays(room_of(world));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(world.bodies_within({rays.point(), Sphere{Real(0.5)}, {}, 1}));
+  }
+}
+
 /// A ray after a change of the world, which builds the tree again.
 void ray_after_change(benchmark::State& state, const char* scene) {
   World world = make_world(scene);
@@ -127,6 +145,9 @@ void register_all() {
     add("cast_capsule", cast_capsule);
     add("cast_box", cast_box);
     add("cast_short", cast_short);
+    add("closest_to_point", closest_to_point);
+    add("closest_to_box", closest_to_box);
+    add("within", within);
     add("overlap", overlap);
     add("ray_after_change", ray_after_change);
   }

@@ -1,4 +1,4 @@
-/// Rays, moving solids and their hits, for the queries of a World.
+/// Rays, moving solids, distances and their results, for the queries of a World.
 #pragma once
 
 #include <jfpx/body.hpp>
@@ -46,6 +46,24 @@ struct ShapeHit {
   Vec3 normal;        ///< [-], unit, from the body to the solid
   Real distance = 0;  ///< [m], <= 0: negative depth of an overlap at the start
   friend bool operator==(const ShapeHit&, const ShapeHit&) = default;
+};
+
+/// A point or a solid whose distances from bodies are asked for.
+struct DistanceQuery {
+  Vec3 position = {};            ///< [m], of the origin of the shape, within kMaxCoordinate
+  SolidShape shape = Sphere{0};  ///< a sphere of radius 0 is a point
+  Quat orientation = {};         ///< unit quaternion
+  Real max_distance = std::numeric_limits<Real>::infinity();  ///< [m], >= 0
+};
+
+/// The closest points of a body and a solid, so that query_point = point + normal * distance.
+struct BodyDistance {
+  BodyId body;
+  Real distance = 0;  ///< [m]; of an overlap < 0: negative depth
+  Vec3 point;         ///< [m], world, of the surface of the body
+  Vec3 query_point;   ///< [m], world, of the surface of the solid
+  Vec3 normal;        ///< [-], unit, from the body to the solid
+  friend bool operator==(const BodyDistance&, const BodyDistance&) = default;
 };
 
 /// Predicate that selects bodies; empty selects all. A query calls it for bodies that it hits, at

@@ -350,6 +350,20 @@ class JFPX_API World {
   /// @throws as cast_shape()
   std::vector<ShapeHit> cast_shape_through(const ShapeCast& cast,
                                            const BodyFilter& filter = {}) const;
+  /// The body that is closest to a point or a solid; among bodies at the same distance, the one
+  /// with the lowest index. The distance of a body is that of its closest part, as closest_points()
+  /// (collide.hpp) computes it. Bodies that the solid overlaps have negative distances, so the
+  /// deepest one is closest. As for contacts, a one-sided triangle counts if the centre of the
+  /// solid is in front of it, and a plane from the side of the centre. The depth in a mesh is that
+  /// of the deepest contact with a triangle, or 0 if there is none.
+  /// @throws InvalidArgument for a shape, position, orientation or distance that is out of its
+  ///   range; std::bad_alloc
+  std::optional<BodyDistance> closest_body(const DistanceQuery& query,
+                                           const BodyFilter& filter = {}) const;
+  /// All bodies up to the distance of a query, sorted by distance, then by index.
+  /// @throws as closest_body()
+  std::vector<BodyDistance> bodies_within(const DistanceQuery& query,
+                                          const BodyFilter& filter = {}) const;
   /// Bodies that overlap a solid, in the order of bodies(). Exact contact counts; the arithmetic is
   /// that of contacts().
   /// @param position [m], of the origin of the shape's axes

@@ -168,6 +168,62 @@ void visit_triangles_swept(const MeshView& mesh, const Vec3& centre, const Vec3&
   }
 }
 
+/// [m], lower bound of the distance of a box and a triangle.
+inline Real gap_of_bounds(const Vec3 (&corner)[3], const Vec3& centre, const Vec3& half_extents) {
+  Vec3 gap;
+  for (int i = 0; i < 3; ++i) {
+    const auto [least, most] = std::minmax({corner[0][i], corner[1][i], corner[2][i]});
+    const Real beside = std::max(least - centre[i], centre[i] - most) - half_extents[i];
+    gap[i] = std::max(beside, Real(0));
+  }
+  return length(gap);
+}
+
+/// Calls limit = visit(triangle) for the triangles of the cell that is closest to a point, whose
+/// distance is a good first limit.
+template <class Visit>
+Real visit_closest_cell(const GridView& grid, const Vec3& point, Real limit, const Visit& visit) {
+  const auto cell_at = [](Real p, std::uint32_t vertices, Real spacing) {
+    const Real last = GridView::place(vertices - 1, vertices, spacing);
+    const Real inside = std::clamp(p, -last, last);
+    return GridView::cells_between(inside, inside, vertices, spacing).begin;
+  };
+  const std::uint32_t cell = cell_at(point.z, grid.rows, grid.spacing_z) * grid.columns +
+                             cell_at(point.x, grid.columns, grid.spacing_x);
+  for (std::uint32_t k = 0; k < 2; ++k) {
+    if (grid.has_triangle(2 * cell + k)) limit = visit(2 * cell + k);
+  }
+  return limit;
+}
+
+/// Calls limit = visit(triangle) for each triangle whose distance from a solid may be at most the
+/// current limit [m]. May visit a triangle twice.
+/// @param centre,half_extents [m], of the bounds of the solid, in the axes of the mesh
+/// @param limit               [m], >= 0, initial limit; may be infinite
+template <class Visit>
+void visit_triangles_nearby(const MeshView& mesh, const Vec3& centre, const Vec3& half_extents,
+                            Real limit, const Visit& visit) {
+  if (!mesh.is_grid()) {
+    TreeTraversal::visit_nearby(mesh.tree, centre, half_extents, limit, visit);
+    return;
+  }
+  const GridView& grid = mesh.grid;
+  limit = visit_closest_cell(grid, centre, limit, visit);
+  const Real reach = std::max({half_extents.x, half_extents.y, half_extents.z});
+  TreeTraversal::visit_nearby(mesh.tree, centre, half_extents, limit, [&](std::uint32_t tile) {
+    const Real size = distance_to_corners(grid, tile, centre) + reach;
+    const Real margin = size * TreeTraversal::kGapMargin + kLostLength;
+    const Real around = limit + margin;
+    const Vec3 r = half_extents + Vec3{around, around, around};
+    grid.visit_overlapping_in(tile, {centre - r, centre + r}, [&](std::uint32_t triangle) {
+      Vec3 corner[3];
+      grid.get_corners(triangle, corner);
+      if (gap_of_bounds(corner, centre, half_extents) <= limit + margin) limit = visit(triangle);
+    });
+    return limit;
+  });
+}
+
 /// The first hit of a ray up to a distance. A one-sided triangle is hit from its front only. The
 /// normal points to the side from which the ray comes. Of triangles at the same distance, the one
 /// with the lowest number is hit.

@@ -1,5 +1,6 @@
 list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/block_tree.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/closest_points.cpp
   ${CMAKE_CURRENT_LIST_DIR}/collide.cpp
   ${CMAKE_CURRENT_LIST_DIR}/heightfield.cpp
   ${CMAKE_CURRENT_LIST_DIR}/hull/grid.cpp

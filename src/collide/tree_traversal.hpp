@@ -1,4 +1,4 @@
-/// Traversal of a tree of boxes along a ray, and around a box.
+/// Traversal of a tree of boxes along a ray, around a box, and by the distance from a box.
 #pragma once
 
 #include "src/collide/block_tree.hpp"
@@ -19,12 +19,17 @@ inline namespace JFPX_ABI {
 ///   - Solids that move along a line: the same with the bounds enlarged by the half extents of the
 ///     solid. D is then the largest coordinate difference to the enlarged bounds, and the margin
 ///     1024 u D, because the axes of both solids are rounded.
+///   - Distances: the computed distance of two solids is at least that of their bounds, with an
+///     error of at most 300 u (D + R), where R is the largest half extent of the query. The margin
+///     is 1024 u (D + R).
 ///   - Boxes: the margin is at least 22 sqrt(epsilon) (D + R), where R is the largest half extent
 ///     of the query.
 ///   - kLostLength exceeds all lengths that are lost because their squares are denormal.
 /// D of a node, and therefore its margin, is at least that of its children.
 class TreeTraversal {
  public:
+  /// [-], of distances, relative to D + R
+  static constexpr Real kGapMargin = 512 * kEpsilon;
   /// [-], of boxes, relative to D + R
   static constexpr Real kOverlapMargin = sizeof(Real) == 4 ? Real(0x1p-7) : Real(0x1p-21);
 
@@ -45,6 +50,15 @@ class TreeTraversal {
   static void visit_swept(const BlockTreeView& tree, const Vec3& centre, const Vec3& half_extents,
                           const Vec3& direction, Real limit, const Visit& visit) {
     traverse(tree, SlabTest<true>(centre, direction, half_extents), limit, visit);
+  }
+
+  /// Calls limit = visit(item) for each item whose distance from a solid with the given bounds may
+  /// be at most the current limit [m], roughly the nearest ones first.
+  /// @param limit [m], >= 0, initial limit; may be infinite
+  template <class Visit>
+  static void visit_nearby(const BlockTreeView& tree, const Vec3& centre, const Vec3& half_extents,
+                           Real limit, const Visit& visit) {
+    traverse(tree, GapTest{centre, half_extents}, limit, visit);
   }
 
   /// Calls visit(item) for each item that a solid with the given bounds may touch.
@@ -131,6 +145,32 @@ class TreeTraversal {
       exit.fill(0);
       for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
         entry[lane] = gap[lane] - (size[lane] * kOverlapMargin + detail::kLostLength);
+      }
+    }
+
+    Vec3 centre, half_extents;
+  };
+
+  /// Distance of a box from each lane, less the margin of the comment above.
+  struct GapTest {
+    void operator()(const TreeBlock& block, Real limit, Lanes& entry, Lanes& exit) const {
+      const Real reach = std::max({half_extents.x, half_extents.y, half_extents.z});
+      Lanes size, squared{};
+      size.fill(reach);
+      for (int i = 0; i < 3; ++i) {
+        for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+          const Real a = block.lower[i][lane] - centre[i], b = centre[i] - block.upper[i][lane];
+          const Real beside = (a > b ? a : b) - half_extents[i];
+          const Real gap = beside > 0 ? beside : Real(0);
+          squared[lane] += gap * gap;
+          const Real c = absolute(a), d = absolute(b), larger = c > d ? c : d;
+          size[lane] = larger + reach > size[lane] ? larger + reach : size[lane];
+        }
+      }
+      // Unused lanes are farther than any solid.
+      exit.fill(std::min(limit, TreeBlock::kFar / 4));
+      for (std::uint32_t lane = 0; lane < kWidth; ++lane) {
+        entry[lane] = square_root(squared[lane]) - (size[lane] * kGapMargin + detail::kLostLength);
       }
     }
 

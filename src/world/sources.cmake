@@ -21,6 +21,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/joints/joint_state.cpp
   ${CMAKE_CURRENT_LIST_DIR}/joints/joint_store.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/body_cast.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/queries/body_gap.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/query_arguments.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/query_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/solid_query.cpp

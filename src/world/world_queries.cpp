@@ -1,10 +1,12 @@
-/// Rays, overlaps and casts: exact tests of the bodies that a bounding-volume tree selects.
+/// Rays, casts, distances and overlaps: exact tests of the bodies that a bounding-volume tree
+/// selects.
 #include <jfpx/error.hpp>
 
 #include "src/collide/mesh_queries.hpp"
 #include "src/scene/scene_validate.hpp"
 #include "src/world/bodies/posed_sub_shapes.hpp"
 #include "src/world/queries/body_cast.hpp"
+#include "src/world/queries/body_gap.hpp"
 #include "src/world/queries/query_arguments.hpp"
 #include "src/world/world_impl.hpp"
 
@@ -83,6 +85,11 @@ bool before(const ShapeHit& a, const ShapeHit& b) {
   return std::tuple(a.fraction, a.body.index) < std::tuple(b.fraction, b.body.index);
 }
 
+/// Order of the bodies of a distance query. No two are equal.
+bool before(const BodyDistance& a, const BodyDistance& b) {
+  return std::tuple(a.distance, a.body.index) < std::tuple(b.distance, b.body.index);
+}
+
 }  // namespace
 
 std::optional<RayHit> World::cast_ray(const Ray& given, const BodyFilter& filter) const {
@@ -135,6 +142,39 @@ std::vector<ShapeHit> World::cast_shape_through(const ShapeCast& given,
   });
   std::ranges::sort(hits, [](const ShapeHit& a, const ShapeHit& b) { return before(a, b); });
   return hits;
+}
+
+std::optional<BodyDistance> World::closest_body(const DistanceQuery& query,
+                                                const BodyFilter& filter) const {
+  const BodyGap gap(query);
+  const BodyStore& bodies = impl_->bodies_with_states();
+  std::optional<BodyDistance> closest;
+  const auto limit = [&] {
+    if (!closest) return query.max_distance;
+    return std::max(closest->distance, Real(0));  // the depth of an overlap is no bound of a tree
+  };
+  gap.visit_candidates(impl_->tree_of(bodies), query.max_distance, [&](std::uint32_t body) {
+    const std::optional<BodyDistance> found = gap.to(bodies, body, limit());
+    if (found && (!closest || before(*found, *closest)) && accepts(filter, found->body)) {
+      closest = found;
+    }
+    return limit();
+  });
+  return closest;
+}
+
+std::vector<BodyDistance> World::bodies_within(const DistanceQuery& query,
+                                               const BodyFilter& filter) const {
+  const BodyGap gap(query);
+  const BodyStore& bodies = impl_->bodies_with_states();
+  std::vector<BodyDistance> found;
+  gap.visit_candidates(impl_->tree_of(bodies), query.max_distance, [&](std::uint32_t body) {
+    const std::optional<BodyDistance> one = gap.to(bodies, body, query.max_distance);
+    if (one && accepts(filter, one->body)) found.push_back(*one);
+    return query.max_distance;
+  });
+  std::ranges::sort(found, [](const auto& a, const auto& b) { return before(a, b); });
+  return found;
 }
 
 std::vector<BodyId> World::overlapping(const SolidShape& shape, const Vec3& position,

@@ -1,6 +1,7 @@
 jfpx_add_test(collide_test INTERNAL SOURCES
   collide/box_pair_test.cpp
   collide/capsule_test.cpp
+  collide/closest_points_test.cpp
   collide/collide_test.cpp
   collide/contact_points_test.cpp
   collide/core_sweep_test.cpp

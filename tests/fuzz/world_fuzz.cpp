@@ -180,6 +180,15 @@ void query(Bytes& bytes, Twins& twins) {
     require(first->has_value() == !casts->empty(), "a cast that hits has a first hit");
     require(casts->empty() || **first == casts->front(), "the first hit is the first of all hits");
   }
+  const DistanceQuery query{centre, cast.shape, {}, bytes.number(0, 9)};
+  const auto closest = twins.both([&](World& w) { return w.closest_body(query); });
+  const auto nearby = twins.both([&](World& w) { return w.bodies_within(query); });
+  require(closest.has_value() == nearby.has_value(), "both reject the distance query");
+  if (nearby) {
+    require(closest->has_value() == !nearby->empty(),
+            "a query that finds bodies has a closest one");
+    require(nearby->empty() || **closest == nearby->front(), "the closest body is the first one");
+  }
   const Vec3 half = bytes.vector(Real(0.1), 3);
   twins.both([&](World& w) { return w.overlapping(Box{half}, centre, {0, 1, 0, 0}); });
 }

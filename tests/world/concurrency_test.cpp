@@ -26,6 +26,7 @@ struct Results {
   std::vector<BodyState> states;
   std::vector<RayHit> hits;
   std::vector<ShapeHit> casts;
+  std::vector<BodyDistance> nearby;
   std::vector<BodyId> touched;
   std::vector<Contact> contacts;
   std::vector<ContactForce> forces;
@@ -40,6 +41,7 @@ Results query(const World& world) {
   results.hits = world.cast_ray_through({.origin = {-9, 0, 0}, .direction = {1, 0, 0}});
   results.casts = world.cast_shape_through(
       {.shape = Capsule{}, .position = {-9, 0, 0}, .translation = {18, 0, 0}});
+  results.nearby = world.bodies_within({.shape = Capsule{}, .max_distance = 3});
   results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
   results.contacts.assign(world.contacts().begin(), world.contacts().end());
   results.forces.assign(world.contact_forces().begin(), world.contact_forces().end());

@@ -4,6 +4,7 @@
 #include <jfpx/collide.hpp>
 #include <jfpx/world.hpp>
 
+#include "src/collide/closest_points.hpp"
 #include "src/collide/mesh_queries.hpp"
 #include "src/collide/shape_cast.hpp"
 #include "src/world/bodies/sub_shape_view.hpp"
@@ -53,6 +54,17 @@ class LinearQueries {
     }
     std::ranges::stable_sort(hits, {}, &ShapeHit::fraction);
     return hits;
+  }
+
+  std::vector<BodyDistance> bodies_within(const DistanceQuery& query,
+                                          const BodyFilter& filter = {}) const {
+    std::vector<BodyDistance> found;
+    for (const Body& body : bodies_) {
+      const std::optional<BodyDistance> one = distance_of(query, body);
+      if (one && (!filter || filter(body.id))) found.push_back(*one);
+    }
+    std::ranges::stable_sort(found, {}, &BodyDistance::distance);
+    return found;
   }
 
   /// @param orientation of length 1
@@ -219,17 +231,84 @@ class LinearQueries {
     return first;
   }
 
-  static std::optional<ShapeHit> hit_of(const ShapeCast& cast, const Body& body) {
-    const Transform at = make_transform(normalized(cast.orientation), cast.position);
+  static std::optional<ShapeHit> deepest_of(const SolidShape& solid, const Transform& at,
+                                            const Body& body) {
     std::optional<ShapeHit> deepest;
     for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
-      if (!bounds_overlap(cast.shape, at, shape, pose)) return;
-      visit_touches(cast.shape, at, shape, pose,
+      if (!bounds_overlap(solid, at, shape, pose)) return;
+      visit_touches(solid, at, shape, pose,
                     [&](const Vec3& normal, const Vec3& point, Real distance) {
                       if (deepest && !(distance < deepest->distance)) return;
                       deepest = ShapeHit{body.id, 0, point, normal, distance};
                     });
     });
+    return deepest;
+  }
+
+  /// The closest points of a sub-shape, of all triangles of a mesh.
+  template <class S>
+  static detail::ClosestPair closest_to(const SolidShape& shape, const Transform& at,
+                                        const S& target, const Transform& pose) {
+    const detail::PosedSolid solid(shape, at);
+    constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
+    if constexpr (std::is_same_v<S, HalfSpace>) {
+      return detail::find_closest(target, solid, kUnlimited);
+    } else if constexpr (std::is_same_v<S, Plane>) {
+      return detail::find_closest(facing_side(target, transform_point(at, solid.core.centre)),
+                                  solid, kUnlimited);
+    } else if constexpr (detail::kIsMesh<S>) {
+      const Mat3 rotation = transposed(pose.basis) * at.basis;
+      const Vec3 from = inverse_transform_point(pose, at.origin);
+      const Vec3 centre = from + rotation * solid.core.centre;
+      const detail::MeshView mesh = detail::view_of(target);
+      detail::ClosestPair closest;
+      for (std::uint32_t i = 0; i < mesh.triangle_count; ++i) {
+        if (!mesh.has_triangle(i)) continue;
+        Vec3 corner[3];
+        mesh.get_corners(i, corner);
+        const Vec3 start = corner[0], normal = mesh.normal(i, corner);
+        for (Vec3& p : corner) p -= start;
+        if (mesh.two_sided == 0 && dot(normal, centre - start) < 0) continue;
+        detail::ClosestPair pair = detail::find_closest(
+            detail::make_core(corner, normal), solid.core, rotation, from - start, kUnlimited);
+        pair.distance = std::max(pair.distance, Real(0));
+        pair.point += start;
+        if (!closest.found || pair.distance < closest.distance) closest = pair;
+      }
+      if (!closest.found) return {};
+      closest.point = transform_point(pose, closest.point);
+      closest.normal = normalized(pose.basis * closest.normal);
+      return closest;
+    } else {
+      return detail::find_closest(detail::PosedSolid(target, pose), solid, kUnlimited);
+    }
+  }
+
+  static std::optional<BodyDistance> distance_of(const DistanceQuery& query, const Body& body) {
+    const Transform at = make_transform(normalized(query.orientation), query.position);
+    detail::ClosestPair closest;
+    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+      detail::ClosestPair pair = closest_to(query.shape, at, shape, pose);
+      if constexpr (detail::kIsMesh<std::decay_t<decltype(shape)>>) {
+        const auto deepest = pair.distance == 0 ? deepest_of(query.shape, at, body) : std::nullopt;
+        if (pair.found && deepest) {
+          pair.distance = deepest->distance;
+          pair.normal = deepest->normal;
+          pair.point = add_scaled(deepest->point, pair.normal, pair.distance * Real(-0.5));
+        }
+      }
+      if (!pair.found || (closest.found && !(pair.distance < closest.distance))) return;
+      closest = pair;
+    });
+    if (!closest.found || !(closest.distance <= query.max_distance)) return std::nullopt;
+    return BodyDistance{body.id, closest.distance, closest.point,
+                        add_scaled(closest.point, closest.normal, closest.distance),
+                        closest.normal};
+  }
+
+  static std::optional<ShapeHit> hit_of(const ShapeCast& cast, const Body& body) {
+    const Transform at = make_transform(normalized(cast.orientation), cast.position);
+    const std::optional<ShapeHit> deepest = deepest_of(cast.shape, at, body);
     if (deepest || cast.translation == Vec3{}) return deepest;
     int exponent = 0;
     const Vec3& v = cast.translation;

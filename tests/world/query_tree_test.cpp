@@ -230,6 +230,34 @@ void expect_same_casts(Random* random, const RandomPlace& place, const World& wo
   ASSERT_EQ(world.cast_shape_through(cast, odd), scan.cast_shape_through(cast, odd));
 }
 
+void expect_same_distances(Random* random, const RandomPlace& place, const World& world,
+                           const LinearQueries& scan, Real size, std::uint64_t* found) {
+  DistanceQuery query;
+  query.position = random_ray(random, place, world).origin;
+  if (random->below(3) != 0) query.shape = random_solid(random, place, size);
+  if (random->below(3) != 0) query.orientation = random_rotation(random);
+  if (random->below(2) == 0) query.max_distance = place.length() * random->uniform(0, 4);
+  std::vector<BodyDistance> expected = scan.bodies_within(query);
+  ASSERT_EQ(world.bodies_within(query), expected);
+  const std::optional<BodyDistance> closest = world.closest_body(query);
+  ASSERT_EQ(closest.has_value(), !expected.empty());
+  if (!closest) return;
+  ASSERT_EQ(*closest, expected[0]);
+  *found += expected.size();
+  const auto odd = [&](BodyId id) { return id.index % 2 == 1; };
+  const std::vector<BodyDistance> of_odd = world.bodies_within(query, odd);
+  const std::optional<BodyDistance> closest_odd = world.closest_body(query, odd);
+  std::erase_if(expected, [&](const BodyDistance& one) { return !odd(one.body); });
+  ASSERT_EQ(of_odd, expected);
+  ASSERT_EQ(closest_odd.has_value(), !expected.empty());
+  if (!closest_odd) return;
+  ASSERT_EQ(*closest_odd, expected[0]);
+  // A limit that ends exactly at a body.
+  query.max_distance = std::max(expected[random->below(expected.size())].distance, Real(0));
+  std::erase_if(expected, [&](const auto& one) { return one.distance > query.max_distance; });
+  ASSERT_EQ(world.bodies_within(query, odd), expected);
+}
+
 void change(Random* random, const RandomPlace& place, World* world) {
   const auto any = [&] { return world->bodies()[random->below(world->bodies().size())]; };
   switch (random->below(world->bodies().empty() ? 1 : 5)) {
@@ -251,7 +279,7 @@ TEST(QueryTree, QueriesFindWhatALinearScanFinds) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
   Random random(seed);
-  std::uint64_t hits = 0, found = 0, cast_hits = 0;
+  std::uint64_t hits = 0, found = 0, cast_hits = 0, distances = 0;
   for (int run = 0; run < 300; ++run) {
     const bool usual = run % 2 == 0;
     const Real size = usual ? 1 : random_size(&random, -30, 8);
@@ -274,6 +302,8 @@ TEST(QueryTree, QueriesFindWhatALinearScanFinds) {
         // Contacts of smaller cylinders and cones have points that are no numbers.
         const bool casts = i == 0 && size > Real(1e-6);
         if (casts) expect_same_casts(&random, place, world, scan, size, &cast_hits);
+        if (casts && round % 2 == 0)
+          expect_same_distances(&random, place, world, scan, size, &distances);
         if (HasFatalFailure()) return;
       }
       change(&random, place, &world);
@@ -282,6 +312,7 @@ TEST(QueryTree, QueriesFindWhatALinearScanFinds) {
   EXPECT_GT(hits, 100000u);
   EXPECT_GT(found, 100000u);
   EXPECT_GT(cast_hits, 1000u);
+  EXPECT_GT(distances, 10000u);
 }
 
 /// Rounding makes a ray from far away hit spheres beside it, also outside of their exact bounds.

@@ -30,6 +30,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/box_test.cpp
   world/buoyancy_test.cpp
   world/capsule_world_test.cpp
+  world/closest_body_test.cpp
   world/contact_events_test.cpp
   world/contact_forces_test.cpp
   world/contact_generator_test.cpp

@@ -29,6 +29,16 @@ Transform checked_pose(const SolidShape& shape, const Vec3& position, const Quat
   return make_transform(normalized(orientation), position);
 }
 
+Transform checked_pose(const DistanceQuery& query) {
+  const Sphere* ball = std::get_if<Sphere>(&query.shape);
+  const bool is_point = ball != nullptr && ball->radius == 0;
+  if (!(query.max_distance >= 0)) {
+    throw_invalid_query("max_distance", to_text(query.max_distance), ">= 0; infinity is allowed");
+  }
+  return checked_pose(is_point ? SolidShape(Sphere{}) : query.shape, query.position,
+                      query.orientation);
+}
+
 /// The components are scaled by a power of two before, because the square of the length may
 /// overflow or underflow.
 ScaledLength::ScaledLength(const Vec3& v) {

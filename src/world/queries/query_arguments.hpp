@@ -1,7 +1,7 @@
 /// Checks of the arguments of queries.
 #pragma once
 
-#include <jfpx/shape.hpp>
+#include <jfpx/query.hpp>
 
 #include <string>
 
@@ -15,6 +15,10 @@ inline namespace JFPX_ABI {
 /// The pose of a solid. @throws InvalidArgument for a shape, position or orientation that is
 /// invalid for a body
 Transform checked_pose(const SolidShape& shape, const Vec3& position, const Quat& orientation);
+
+/// The pose of the solid of a query, of which a sphere may have the radius 0.
+/// @throws InvalidArgument for any argument that is out of its range
+Transform checked_pose(const DistanceQuery& query);
 
 /// Direction and length of a finite vector that is not zero.
 struct ScaledLength {

@@ -25,6 +25,7 @@ inline namespace JFPX_ABI {
 ///     differs from an orthonormal matrix by up to 140 u).
 ///   - Casts: a solid touches a body within 16 u of the sum of their sizes, and their axes may
 ///     differ from orthonormal ones as above; see TreeTraversal.
+///   - Distances: as casts; see TreeTraversal.
 ///   - Overlaps: all errors are proportional to D + R, where R is the largest half extent of the
 ///     query. The largest one is that of two boxes with nearly parallel edges: collide() may report
 ///     them as touching if their gap along the common normal is below 2 sqrt(epsilon) times the sum
@@ -55,6 +56,16 @@ class QueryTree {
                    const Visit& visit) const {
     for (const std::uint32_t wall : walls_) limit = visit(wall);
     TreeTraversal::visit_swept(tree_.view(), centre, half_extents, direction, limit, visit);
+  }
+
+  /// Calls limit = visit(body) for the walls, then for each body whose distance from a solid with
+  /// the given bounds may be at most the current limit [m].
+  /// @param limit [m], >= 0, initial limit
+  template <class Visit>
+  void visit_nearby(const Vec3& centre, const Vec3& half_extents, Real limit,
+                    const Visit& visit) const {
+    for (const std::uint32_t wall : walls_) limit = visit(wall);
+    TreeTraversal::visit_nearby(tree_.view(), centre, half_extents, limit, visit);
   }
 
   /// Calls visit(body) for the walls, and for each body that a solid with the given bounds may

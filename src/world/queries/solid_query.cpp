@@ -87,21 +87,41 @@ bool QuerySolid::touches(const BodyStore& bodies, std::uint32_t body) const {
   return found;
 }
 
+namespace {
+
+/// @param deepest receives the contact if it is deeper
+template <class S>
+void find_deepest(const QuerySolid& solid, const S& shape, const Transform& at,
+                  DeepestContact* deepest) {
+  if (!bounds_overlap(solid, shape, at)) return;
+  DeepestContact own;
+  std::uint32_t number = 0;
+  visit_touches(solid, shape, at, [&](const DeepestContact& c, std::uint32_t triangle) {
+    const bool is_first = c.distance == own.distance && triangle < number;
+    if (!own.touches || c.distance < own.distance || is_first) own = c, number = triangle;
+    return true;
+  });
+  if (own.touches && (!deepest->touches || own.distance < deepest->distance)) *deepest = own;
+}
+
+}  // namespace
+
 DeepestContact QuerySolid::deepest_contact(const BodyStore& bodies, std::uint32_t body) const {
   DeepestContact deepest;
   for_each_posed_sub_shape(bodies, body, [&](const auto& sub_shape, const Transform& at) {
-    if (!bounds_overlap(*this, sub_shape, at)) return;
-    DeepestContact own;
-    std::uint32_t number = 0;
-    visit_touches(*this, sub_shape, at, [&](const DeepestContact& c, std::uint32_t triangle) {
-      const bool is_first = c.distance == own.distance && triangle < number;
-      if (!own.touches || c.distance < own.distance || is_first) own = c, number = triangle;
-      return true;
-    });
-    if (own.touches && (!deepest.touches || own.distance < deepest.distance)) deepest = own;
+    find_deepest(*this, sub_shape, at, &deepest);
   });
   return deepest;
 }
+
+template <class S>
+DeepestContact QuerySolid::deepest_contact(const S& mesh, const Transform& at) const {
+  DeepestContact deepest;
+  find_deepest(*this, mesh, at, &deepest);
+  return deepest;
+}
+template DeepestContact QuerySolid::deepest_contact(const TriangleMesh&, const Transform&) const;
+template DeepestContact QuerySolid::deepest_contact(const Heightfield&, const Transform&) const;
 
 }  // namespace JFPX_ABI
 }  // namespace jfpx

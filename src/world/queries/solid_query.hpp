@@ -28,6 +28,9 @@ struct QuerySolid {
   bool touches(const BodyStore& bodies, std::uint32_t body) const;
   /// Only for sub-shapes whose bounds overlap those of the solid.
   DeepestContact deepest_contact(const BodyStore& bodies, std::uint32_t body) const;
+  /// The same for a mesh or a heightfield.
+  template <class S>
+  DeepestContact deepest_contact(const S& mesh, const Transform& at) const;
 };
 
 }  // namespace JFPX_ABI
