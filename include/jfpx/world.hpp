@@ -11,6 +11,7 @@
 #include <jfpx/sphere_collider.hpp>
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -40,6 +41,9 @@ struct WorldSettings {
   /// Solver::worst_first, only the search for sphere contacts uses them.
   unsigned threads = 1;
   BroadPhase broad_phase = BroadPhase::cells;
+  /// [m/s], > 0: the least approach speed of World::hit_events(), for example 1. If it is infinite,
+  /// there are no hit events. Has no effect on the motion.
+  Real hit_speed = std::numeric_limits<Real>::infinity();
 };
 
 /// One contact point of two bodies. Boxes in contact along a face have several points; compounds
@@ -81,6 +85,17 @@ struct ContactEvent {
   Vec3 point;         ///< [m], world: the deepest point
   Real distance = 0;  ///< [m], <= 0, at the deepest point
   friend bool operator==(const ContactEvent&, const ContactEvent&) = default;
+};
+
+/// Two bodies that hit each other in a step: they pushed each other apart, and approached at a
+/// point of their contact with at least WorldSettings::hit_speed at the start of the step.
+struct HitEvent {
+  BodyId a, b;  ///< a.index < b.index; the bodies may have been removed
+  Vec3 normal;  ///< [-], unit, from b to a
+  /// [m], world, at the start of the step: the fastest point of the contact, as in Contact
+  Vec3 point;
+  Real approach_speed = 0;  ///< [m/s], > 0, of the point along the normal, at the start of the step
+  friend bool operator==(const HitEvent&, const HitEvent&) = default;
 };
 
 /// Force of a contact point: the mean force over the last substep of a step.
@@ -417,6 +432,15 @@ class JFPX_API World {
   /// computes the list.
   /// @throws std::bad_alloc
   std::span<const ContactEvent> contact_events() const;
+  /// The pairs of bodies that hit each other in the last step, one event for each, sorted by
+  /// (a.index, b.index). Contacts of sensors and of contact generators have no events. The speed is
+  /// that before the forces and contacts of the step, so a body that rests or slides has none; a
+  /// pair that is pressed together again after a rebound has another event. Empty with
+  /// Solver::worst_first, after restore() until the next step, after a failed step, and unless
+  /// WorldSettings::hit_speed is finite. Valid like contact_events(). The first call after a step
+  /// computes the list.
+  /// @throws std::bad_alloc, DeviceError
+  std::span<const HitEvent> hit_events() const;
   /// Forces of the contact points that push the bodies apart at the end of the last step, including
   /// those of contact generators: first between two spheres, then all others, both sorted by
   /// (a.index, b.index). Impacts are not included: a point that pushed in the step but not in its

@@ -20,16 +20,17 @@ from ._neighbors import Neighbors, find_neighbors
 from ._recording import Recording, RecordingWriter, TrajectoryWriter
 from ._scene import Scene, scene_names
 from ._view import View
-from ._world import (BEGIN, END, STAY, ContactEvents, ContactForces, RayHit, RayHits, ShapeHit,
-                     ShapeHits, StepReport, World, WorldContacts)
+from ._world import (BEGIN, END, STAY, BodyDistance, BodyDistances, ContactEvents, ContactForces,
+                     HitEvents, RayHit, RayHits, ShapeHit, ShapeHits, StepReport, World,
+                     WorldContacts)
 
 __version__ = "0.3.0"
 
 __all__ = [
-    "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyId", "BodyState", "Bungee",
-    "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts",
+    "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyDistance", "BodyDistances", "BodyId",
+    "BodyState", "Bungee", "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts",
     "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError",
-    "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "InvalidArgument", "InvalidScene",
+    "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene",
     "InvalidSnapshot", "JointId", "JointState", "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows",
     "PeriodicContacts", "PeriodicNearest", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
     "RecordingWriter", "Rows", "STAY", "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring",

@@ -149,6 +149,29 @@ BEGIN, STAY, END = 0, 1, 2
 """Values of ContactEvents.phase."""
 
 
+class HitEvents(NamedTuple):
+    """Pairs of bodies that hit each other in the last step: they pushed each other apart, and
+    approached with at least the `hit_speed` of the world before. Sorted by (pairs[0], pairs[1]).
+    Floating-point arrays have the dtype of the world.
+
+    Attributes
+    ----------
+    pairs : array (2, H) of int64
+        BodyId.index of a and b, a < b, as in WorldContacts. The bodies may have been removed.
+    normal : array (H, 3)
+        Unit vectors from b to a, at the fastest points of the contacts.
+    point : array (H, 3)
+        The fastest points [m] at the start of the step, in the axes of the world.
+    approach_speed : array (H,)
+        [m/s], > 0, of these points along the normals, at the start of the step.
+    """
+
+    pairs: np.ndarray
+    normal: np.ndarray
+    point: np.ndarray
+    approach_speed: np.ndarray
+
+
 class ContactEvents(NamedTuple):
     """Pairs of bodies that began to touch, stay in contact or ceased to touch in the last step,
     sorted by (pairs[0], pairs[1]). Floating-point arrays have the dtype of the world.
@@ -269,6 +292,54 @@ class ShapeHits(NamedTuple):
     distance: np.ndarray
 
 
+class BodyDistance(NamedTuple):
+    """The closest points of a body and a point or a solid: query_point = point + normal * distance.
+
+    Attributes
+    ----------
+    body : BodyId
+        The body.
+    distance : float
+        [m]; of an overlap < 0: negative depth.
+    point : three numbers
+        [m], in the axes of the world, of the surface of the body.
+    query_point : three numbers
+        [m], of the surface of the solid, or the point.
+    normal : three numbers
+        Unit vector, from the body to the solid.
+    """
+
+    body: BodyId
+    distance: float
+    point: tuple[float, ...]
+    query_point: tuple[float, ...]
+    normal: tuple[float, ...]
+
+
+class BodyDistances(NamedTuple):
+    """The closest bodies of Q points or solids. Floating-point arrays have the dtype of the world.
+
+    Attributes
+    ----------
+    bodies : array (Q,) of int64
+        BodyId.index, as in WorldContacts; -1: there is no body.
+    distance : array (Q,)
+        [m]; of an overlap < 0: negative depth; infinity: no body.
+    point : array (Q, 3)
+        [m], of the surfaces of the bodies; zero: no body.
+    query_point : array (Q, 3)
+        [m], of the surfaces of the solids; zero: no body.
+    normal : array (Q, 3)
+        Unit vectors, from the body to the solid; zero: no body.
+    """
+
+    bodies: np.ndarray
+    distance: np.ndarray
+    point: np.ndarray
+    query_point: np.ndarray
+    normal: np.ndarray
+
+
 class World:
     """Rigid bodies and their motion. The states after a step are the same to the last bit for every
     backend, algorithm and number of threads.
@@ -297,6 +368,9 @@ class World:
         As for SphereCollider.
     threads : int in [0, 256]
         Number of threads of the CPU; 0: one per core.
+    hit_speed : float
+        [m/s], > 0: the least approach speed of hit_events(), for example 1. Infinity: there are no
+        hit events.
 
     Raises
     ------
@@ -312,7 +386,7 @@ class World:
 
     def __init__(self, scene: Scene | dict[str, Any] | str, *, dtype: Any = None,
                  backend: str = "auto", algorithm: str = "auto", threads: int = 1,
-                 device: int = 0) -> None:
+                 device: int = 0, hit_speed: float = math.inf) -> None:
         if dtype is not None:
             _arrays.precision_of(dtype)
         if isinstance(scene, str):
@@ -326,8 +400,10 @@ class World:
             raise InvalidArgument(f"dtype is {dtype}; that of the scene is {scene.dtype}")
         self._dtype = scene.dtype
         self._core = _arrays.precision_of(self._dtype).World(
-            scene._scene, *_arrays.options(backend, algorithm, threads, device))
-        self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device}
+            scene._scene, *_arrays.options(backend, algorithm, threads, device),
+            _arrays.number(hit_speed, "hit_speed"))
+        self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device,
+                         "hit_speed": hit_speed}
         self._device = device
         self._report: StepReport | None = None
         self._followers: list[Callable[[], None]] = []  # called after each step
@@ -936,6 +1012,17 @@ class World:
         self._core.write_events(*result)
         return result
 
+    def hit_events(self) -> HitEvents:
+        """Pairs of bodies that hit each other in the last step, as new arrays; the `hit_speed` of
+        the world is the least speed. There are none before the first step, after an undone step,
+        after restore() until the next step, with the solver worst_first, and if `hit_speed` is
+        infinite. Raises OutOfMemory, DeviceError."""
+        size = self._core.hit_count()
+        result = HitEvents(np.empty((2, size), np.int64), self._rows(size), self._rows(size),
+                           self._values(size))
+        self._core.write_hits(*result)
+        return result
+
     def contact_forces(self) -> ContactForces:
         """Forces of the contact points that push at the end of the last step, as new arrays; they
         include those of sleeping bodies. There are none when contacts() has none, after restore()
@@ -1092,15 +1179,96 @@ class World:
         if translations.shape[0] != size:
             raise InvalidArgument(
                 f"translations has {translations.shape[0]} rows; positions has {size}")
-        turned = _arrays.converted(orientations, "orientations", self._dtype)
-        if turned.ndim == 1:
-            turned = turned[np.newaxis]
-        turned = _arrays.rows(turned, "orientations", 4)
-        if turned.shape[0] not in (1, size):
-            raise InvalidArgument(f"orientations has {turned.shape[0]} rows; positions has {size}")
+        turned = self._orientations(orientations, size)
         result = ShapeHits(np.empty(size, np.int64), self._values(size), self._rows(size),
                            self._rows(size), self._values(size))
         self._core.cast_shapes(self._solid(shape), positions, translations, turned, *result)
+        return result
+
+    def closest_body(self, position: Vector, shape: dict[str, Any] | None = None,
+                     orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+                     max_distance: float = math.inf, *,
+                     filter: Callable[[BodyId], bool] | None = None) -> BodyDistance | None:
+        """The body that is closest to a point or a solid, or None; of bodies at the same distance,
+        that with the lowest index. Overlaps have negative distances, so the deepest one is closest.
+        All bodies count, also sensors, whatever their collision filters; a one-sided triangle counts
+        from its front.
+
+        Parameters
+        ----------
+        position : three numbers
+            [m], of the point or the origin of the shape, each in [-1e9, 1e9].
+        shape : dict, optional
+            A solid, as for cast_shape(); None: a point.
+        orientation : four numbers
+            Unit quaternion (w, x, y, z), to a thousandth of the squared length.
+        max_distance : float
+            [m], >= 0; infinity is allowed. Bodies that are farther do not count.
+        filter : function, optional
+            Called with the BodyId of a body that is close enough, at most once for each; the body
+            counts if the result is true. It must not change the world.
+
+        Raises
+        ------
+        InvalidScene
+            A field of `shape` is unknown, missing or out of its range.
+        InvalidArgument
+            Another number is out of its range, or `shape` is no solid.
+        OutOfMemory, DeviceError, and exceptions of `filter`
+        """
+        found = self._core.closest_body(
+            self._solid_or_point(shape), _arrays.triple(position, "position"),
+            _arrays.triple(orientation, "orientation", 4),
+            _arrays.number(max_distance, "max_distance"), _of_body(filter))
+        return None if found is None else BodyDistance(BodyId(*found[0]), *found[1:])
+
+    def bodies_within(self, position: Vector, max_distance: float,
+                      shape: dict[str, Any] | None = None,
+                      orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                      filter: Callable[[BodyId], bool] | None = None) -> list[BodyDistance]:
+        """All bodies up to a distance from a point or a solid, sorted by distance, then by index.
+        Parameters and exceptions are those of closest_body()."""
+        found = self._core.bodies_within(
+            self._solid_or_point(shape), _arrays.triple(position, "position"),
+            _arrays.triple(orientation, "orientation", 4),
+            _arrays.number(max_distance, "max_distance"), _of_body(filter))
+        return [BodyDistance(BodyId(*one[0]), *one[1:]) for one in found]
+
+    def closest_bodies(self, positions: Any, shape: dict[str, Any] | None = None,
+                       orientations: Any = (1.0, 0.0, 0.0, 0.0),
+                       max_distances: Any = math.inf) -> BodyDistances:
+        """The closest bodies of many points, or of one solid at many positions, as those of
+        closest_body(). Lists and arrays of other numbers are converted to the dtype of the world.
+
+        Parameters
+        ----------
+        positions : array (Q, 3)
+            [m], each number in [-1e9, 1e9].
+        shape : dict, optional
+            A solid, as for cast_shape(); None: points.
+        orientations : four numbers or array (Q, 4)
+            Unit quaternions (w, x, y, z).
+        max_distances : number or array (Q,)
+            [m], >= 0; infinity is allowed.
+
+        Raises
+        ------
+        InvalidScene
+            A field of `shape` is unknown, missing or out of its range.
+        InvalidArgument
+            A wrong shape or type of an array, or a number out of its range; the message then has
+            the query.
+        OutOfMemory, DeviceError
+        """
+        positions = _arrays.rows(_arrays.converted(positions, "positions", self._dtype),
+                                 "positions", 3)
+        size = positions.shape[0]
+        turned = self._orientations(orientations, size)
+        limits = _arrays.vector(_arrays.converted(max_distances, "max_distances", self._dtype),
+                                "max_distances", size, self._dtype)
+        result = BodyDistances(np.empty(size, np.int64), self._values(size), self._rows(size),
+                               self._rows(size), self._rows(size))
+        self._core.closest_bodies(self._solid_or_point(shape), positions, turned, limits, *result)
         return result
 
     def overlapping(self, shape: dict[str, Any], position: Vector,
@@ -1150,6 +1318,19 @@ class World:
     def _solid(self, shape: dict[str, Any]) -> Any:
         """The shape in a scene of one body."""
         return Scene({"bodies": [{"shape": shape, "mass": 0}]}, dtype=self._dtype)._scene
+
+    def _solid_or_point(self, shape: dict[str, Any] | None) -> Any:
+        return None if shape is None else self._solid(shape)
+
+    def _orientations(self, orientations: Any, size: int) -> np.ndarray:
+        """An array of shape (1, 4) or (size, 4)."""
+        turned = _arrays.converted(orientations, "orientations", self._dtype)
+        if turned.ndim == 1:
+            turned = turned[np.newaxis]
+        turned = _arrays.rows(turned, "orientations", 4)
+        if turned.shape[0] not in (1, size):
+            raise InvalidArgument(f"orientations has {turned.shape[0]} rows; positions has {size}")
+        return turned
 
     def _rows(self, size: int) -> np.ndarray:
         return np.empty((size, 3), self._dtype)

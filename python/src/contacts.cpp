@@ -67,6 +67,19 @@ void write_events(const PythonWorld& self, const Vector<std::int64_t>& phases,
   }
 }
 
+void write_hits(const PythonWorld& self, const Rows<std::int64_t>& pairs, const Rows<Real>& normals,
+                const Rows<Real>& points, const Vector<Real>& speeds) {
+  const std::span<const HitEvent> hits = self.get().hit_events();
+  require_size(speeds, hits.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    pairs(0, i) = hits[i].a.index;
+    pairs(1, i) = hits[i].b.index;
+    set_row(normals, i, hits[i].normal);
+    set_row(points, i, hits[i].point);
+    speeds(i) = hits[i].approach_speed;
+  }
+}
+
 Ray to_ray(const Triple& origin, const Triple& direction, double max_distance) {
   return {.origin = to_vec3(origin),
           .direction = to_vec3(direction),
@@ -132,6 +145,49 @@ void cast_shapes(const PythonWorld& self, const Scene& shape, const Rows<const R
   }
 }
 
+/// @param shape null: a point
+DistanceQuery to_query(const Scene* shape, const Triple& position, const Quadruple& orientation,
+                       double max_distance) {
+  return {to_vec3(position), shape != nullptr ? to_solid_shape(*shape) : Sphere{0},
+          to_quat(orientation), static_cast<Real>(max_distance)};
+}
+
+nb::tuple to_python(const BodyDistance& found) {
+  return nb::make_tuple(to_tuple(found.body), static_cast<double>(found.distance),
+                        to_triple(found.point), to_triple(found.query_point),
+                        to_triple(found.normal));
+}
+
+/// The closest body of each position; -1 if there is none.
+void closest_bodies(const PythonWorld& self, const Scene* shape, const Rows<const Real>& positions,
+                    const Rows<const Real>& orientations, const Vector<const Real>& max_distances,
+                    const Vector<std::int64_t>& bodies, const Vector<Real>& distances,
+                    const Rows<Real>& points, const Rows<Real>& query_points,
+                    const Rows<Real>& normals) {
+  const World& world = self.get();
+  DistanceQuery query;
+  if (shape != nullptr) query.shape = to_solid_shape(*shape);
+  for (std::size_t i = 0; i < bodies.shape(0); ++i) {
+    const std::size_t turned = orientations.shape(0) == 1 ? 0 : i;
+    query.position = vec3_at(positions, i);
+    query.orientation = {orientations(turned, 0), orientations(turned, 1), orientations(turned, 2),
+                         orientations(turned, 3)};
+    query.max_distance = max_distances(max_distances.shape(0) == 1 ? 0 : i);
+    std::optional<BodyDistance> found;
+    try {
+      found = world.closest_body(query);
+    } catch (const InvalidArgument& e) {
+      throw InvalidArgument("query " + std::to_string(i) + ": " + e.what());
+    }
+    bodies(i) = found ? std::int64_t{found->body.index} : -1;
+    const BodyDistance values = found.value_or(BodyDistance{});
+    distances(i) = found ? values.distance : std::numeric_limits<Real>::infinity();
+    set_row(points, i, values.point);
+    set_row(query_points, i, values.query_point);
+    set_row(normals, i, values.normal);
+  }
+}
+
 /// The first hit of each ray; -1 for the body of a ray without a hit.
 void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
                const Rows<const Real>& directions, const Vector<const Real>& max_distances,
@@ -179,6 +235,8 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
       .def("force_count",
            [](const PythonWorld& self) { return self.get().contact_forces().size(); })
       .def("write_forces", &write_forces)
+      .def("hit_count", [](const PythonWorld& self) { return self.get().hit_events().size(); })
+      .def("write_hits", &write_hits)
       .def("cast_rays", &cast_rays)
       .def(
           "cast_ray",
@@ -229,6 +287,33 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
           },
           nb::arg("shape"), nb::arg("position"), nb::arg("translation"), nb::arg("orientation"),
           nb::arg("filter").none())
+      .def("closest_bodies", &closest_bodies, nb::arg("shape").none(), nb::arg("positions"),
+           nb::arg("orientations"), nb::arg("max_distances"), nb::arg("bodies"),
+           nb::arg("distances"), nb::arg("points"), nb::arg("query_points"), nb::arg("normals"))
+      .def(
+          "closest_body",
+          [](const PythonWorld& self, const Scene* shape, Triple position, Quadruple orientation,
+             double max_distance, const nb::object& filter) -> std::optional<nb::tuple> {
+            const auto found = self.get().closest_body(
+                to_query(shape, position, orientation, max_distance), to_filter(filter));
+            if (!found) return std::nullopt;
+            return to_python(*found);
+          },
+          nb::arg("shape").none(), nb::arg("position"), nb::arg("orientation"),
+          nb::arg("max_distance"), nb::arg("filter").none())
+      .def(
+          "bodies_within",
+          [](const PythonWorld& self, const Scene* shape, Triple position, Quadruple orientation,
+             double max_distance, const nb::object& filter) {
+            nb::list all;
+            for (const BodyDistance& found : self.get().bodies_within(
+                     to_query(shape, position, orientation, max_distance), to_filter(filter))) {
+              all.append(to_python(found));
+            }
+            return all;
+          },
+          nb::arg("shape").none(), nb::arg("position"), nb::arg("orientation"),
+          nb::arg("max_distance"), nb::arg("filter").none())
       .def("overlapping",
            [](const PythonWorld& self, const Scene& shape, Triple position, Quadruple orientation) {
              return to_tuples(self.get().overlapping(to_solid_shape(shape), to_vec3(position),

@@ -27,8 +27,10 @@ PyType_Slot kWorldSlots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse_w
                              {0, nullptr}};
 
 WorldSettings world_settings(const std::string& backend, const std::string& algorithm,
-                             unsigned threads, int device) {
-  return {.collider = collider_options(backend, algorithm, 1, device), .threads = threads};
+                             unsigned threads, int device, double hit_speed) {
+  return {.collider = collider_options(backend, algorithm, 1, device),
+          .threads = threads,
+          .hit_speed = static_cast<Real>(hit_speed)};
 }
 
 /// Replaces all states, or none if one is invalid.
@@ -279,11 +281,12 @@ void bind_world(nb::module_& module) {
       .def(
           "__init__",
           [](PythonWorld* self, const Scene& scene, const std::string& backend,
-             const std::string& algorithm, unsigned threads, int device) {
-            new (self) PythonWorld(scene, world_settings(backend, algorithm, threads, device));
+             const std::string& algorithm, unsigned threads, int device, double hit_speed) {
+            new (self)
+                PythonWorld(scene, world_settings(backend, algorithm, threads, device, hit_speed));
           },
           nb::arg("scene"), nb::arg("backend"), nb::arg("algorithm"), nb::arg("threads"),
-          nb::arg("device"))
+          nb::arg("device"), nb::arg("hit_speed"))
       .def("step", [](PythonWorld& self) { return to_python(self.step()); })
       .def("run", [](PythonWorld& self, std::uint64_t steps) { return to_python(self.run(steps)); })
       .def("close", &PythonWorld::close)

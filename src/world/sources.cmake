@@ -11,6 +11,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contacts_by_body.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/fixed_trees.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contacts/hit_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/neighbor_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device/automatic_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device/device_world.cpp

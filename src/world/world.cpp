@@ -4,6 +4,7 @@
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 #include "src/base/stopwatch.hpp"
+#include "src/scene/scene_validate.hpp"
 #include "src/sphere_collider/backend_table.hpp"
 #include "src/world/world_impl.hpp"
 
@@ -68,6 +69,10 @@ void World::Impl::find_contacts(StepReport* report) {
   report->sphere_contacts = spheres + found.sphere_count;
   report->contacts = spheres + found.contacts.size();
   copy_array(pool.get(), store.moving.position, &found.position);
+  if (has_hit_events()) {
+    copy_array(pool.get(), store.moving.velocity, &found.velocity);
+    copy_array(pool.get(), store.moving.angular_velocity, &found.angular_velocity);
+  }
   found.generated.clear();
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.last.storage();
@@ -260,10 +265,15 @@ World::World(const Scene& scene, const WorldSettings& settings) {
                           std::to_string(settings.collider.threads) +
                           "; it must be 1: WorldSettings::threads are those of the whole step");
   }
+  if (!(settings.hit_speed > 0)) {
+    throw InvalidArgument("hit_speed is " + to_text(settings.hit_speed) +
+                          "; it must be > 0; infinity is allowed");
+  }
   auto pool = std::make_unique<ThreadPool>(settings.threads);
   auto collider = make_sphere_collider(settings.collider, pool.get());
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase,
                      settings.collider.simd);
+  impl_->hit_speed = settings.hit_speed;
   if (settings.collider.backend == Backend::cuda && scene.solver == Solver::soft_step) {
     impl_->device = make_device_world(scene, settings.collider.device);
   }

@@ -18,6 +18,7 @@
 #include "src/world/step/soft_step.hpp"
 #include "src/world/thesis_table.hpp"
 
+#include <limits>
 #include <mutex>
 
 namespace jfpx {
@@ -123,6 +124,10 @@ struct World::Impl {
   JFPX_API const ContactList& contact_list();
   const ContactList& contact_list_before();
   const std::vector<ContactForce>& contact_forces();
+  /// The hits of the last step. Const functions may call it concurrently.
+  /// @throws std::bad_alloc, DeviceError
+  const std::vector<HitEvent>& hit_events();
+  bool has_hit_events() const { return hit_speed <= kMaxReal && scene.solver == Solver::soft_step; }
   /// Builds the contact lists of the last two steps. Called before a change of bodies, or a move of
   /// the state to or from the device, that would change their data.
   void make_contact_lists();
@@ -273,6 +278,7 @@ struct World::Impl {
   StepContacts contacts{pool.get()};
   MotionArrays before;    ///< state that an undone step restores
   bool is_saved = false;  ///< whether `before` belongs to the current step
+  Real hit_speed = std::numeric_limits<Real>::infinity();  ///< WorldSettings::hit_speed
   std::uint64_t steps = 0;
   /// Number of consecutive last steps without changes after which no body was awake.
   std::uint32_t steps_at_rest = 0;

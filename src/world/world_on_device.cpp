@@ -4,6 +4,7 @@
 
 #include "src/base/stopwatch.hpp"
 #include "src/world/contacts/contact_forces.hpp"
+#include "src/world/contacts/hit_events.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <mutex>
@@ -69,7 +70,7 @@ void World::Impl::enter_device() {
   bodies_changed = false;
   force_table.invalidate();
   store.make_inertia_arrays();  // bodies of any kind may be added and edited on the device
-  device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts());
+  device->upload(store, &contact_finder.sub_shapes(), &soft_step.last_contacts(), has_hit_events());
   note_forces();
   mirror.enter();
   flush_joints();
@@ -226,9 +227,23 @@ const std::vector<ContactForce>& World::Impl::contact_forces() {
   });
 }
 
+const std::vector<HitEvent>& World::Impl::hit_events() {
+  return contacts.hits.get([this](std::vector<HitEvent>* hits) {
+    const std::lock_guard lock(fetching);
+    const ScopedTimer timer(&spent_us);
+    soft_step::ContactSet fetched;
+    const BodiesOfStep bodies(store, &mirror.changed);
+    if (resident()) device->fetch_contacts(bodies, false, &fetched, &contacts.detected);
+    find_hits(contacts.detected, resident() ? fetched.view() : soft_step.last_contacts().view(),
+              bodies, hit_speed, pool.get(), hits);
+  });
+}
+
 void World::Impl::make_contact_lists() {
   contact_list();
-  if (contacts.shows_events) contact_list_before();
+  if (!contacts.shows_events) return;
+  contact_list_before();
+  if (has_hit_events()) hit_events();
 }
 
 void World::Impl::fetch_contact_set() {

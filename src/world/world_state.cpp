@@ -212,6 +212,12 @@ std::span<const ContactEvent> World::contact_events() const {
                                         std::span(now.contacts).first(now.detected));
 }
 
+std::span<const HitEvent> World::hit_events() const {
+  impl_->finish();
+  if (!impl_->contacts.shows_events || !impl_->has_hit_events()) return {};
+  return impl_->hit_events();
+}
+
 std::span<const ContactForce> World::contact_forces() const {
   impl_->finish();
   if (!impl_->contacts.shows_list || !impl_->contacts.has_forces) return {};

@@ -296,6 +296,28 @@ def test_events_begin_stay_and_end():
     assert set(phases[1:-1]) == {jfpx.STAY}
 
 
+def test_hit_events_have_the_speed_before_the_step(dtype):
+    world = jfpx.World({"bodies": [BALL, GROUND]}, dtype=dtype, hit_speed=1)
+    hits = []
+    for _ in range(200):
+        before = world.velocities[0, 1]
+        world.step()
+        events = world.hit_events()
+        if len(events.approach_speed):
+            assert events.pairs.tolist() == [[0], [1]]
+            assert events.normal.tolist() == [[0, 1, 0]] and events.approach_speed.dtype == dtype
+            assert events.approach_speed[0] == -before
+            assert events.point[0, 1] == pytest.approx(0, abs=0.2)
+            hits.append(-before)
+    assert len(hits) == 1 and hits[0] == pytest.approx(np.sqrt(2 * 9.81 * 1.5), rel=0.05)
+    copied = copy.deepcopy(world)
+    assert len(copied.hit_events().point) == 0
+    copied.set_state(copied.bodies[0], jfpx.BodyState((0, 2, 0)))
+    assert sum(len(copied.hit_events().point) for _ in range(200) if copied.step()) == 1
+    silent = jfpx.World({"bodies": [BALL, GROUND]})
+    assert sum(len(silent.hit_events().point) for _ in range(200) if silent.step()) == 0
+
+
 def test_rays_agree_with_the_formula_of_a_sphere(rng, dtype):
     centres = (rng.random((40, 3)) * 10).astype(dtype)
     scene = jfpx.Scene(dtype=dtype)
@@ -363,6 +385,47 @@ def test_casts_agree_with_rays_to_larger_spheres(rng, dtype):
                                           filter=lambda body: body != one.body)
         assert others == through[1:]
     assert world.cast_shape(ball, (0, 0, 99), (0, 0, 1)) is None
+
+
+def test_distances_agree_with_the_formula_of_a_sphere(rng, dtype):
+    centres = (rng.random((40, 3)) * 10).astype(dtype)
+    scene = jfpx.Scene(dtype=dtype)
+    scene.add_spheres(centres, 0.5)
+    world = jfpx.World(scene)
+    points = (rng.random((50, 3)) * 14 - 2).astype(dtype)
+    gaps = np.linalg.norm(points[:, np.newaxis] - centres, axis=2) - 0.5
+    for radius, shape in ((0, None), (0.25, {"type": "sphere", "radius": 0.25})):
+        found = world.closest_bodies(points, shape)
+        np.testing.assert_array_equal(found.bodies, gaps.argmin(axis=1))
+        np.testing.assert_allclose(found.distance, gaps.min(axis=1) - radius, atol=2e-6)
+        np.testing.assert_allclose(found.point + found.normal * found.distance[:, np.newaxis],
+                                   found.query_point, atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(found.query_point - points, axis=1), radius,
+                                   atol=1e-5)
+        limited = world.closest_bodies(points, shape, max_distances=1)
+        np.testing.assert_array_equal(limited.bodies, np.where(found.distance <= 1, found.bodies, -1))
+        assert np.isinf(limited.distance[limited.bodies < 0]).all()
+        for i in range(50):
+            one = world.closest_body(points[i], shape)
+            assert one.body.index == found.bodies[i] and one.distance == found.distance[i]
+            near = world.bodies_within(points[i], 2, shape)
+            assert {body.body.index for body in near} == set(np.flatnonzero(gaps[i] - radius <= 2))
+            assert [body.distance for body in near] == sorted(body.distance for body in near)
+            assert near == world.bodies_within(points[i], 3, shape)[:len(near)]
+            others = world.bodies_within(points[i], 9, shape, filter=lambda body: body != one.body)
+            assert others[0] == world.closest_body(points[i], shape,
+                                                   filter=lambda body: body != one.body)
+    assert world.closest_body((0, 0, 99), max_distance=9) is None
+
+
+def test_a_distance_query_turns_the_solid(dtype):
+    world = jfpx.World({"bodies": [GROUND]}, dtype=dtype)
+    stick = {"type": "capsule", "radius": 0.25, "half_height": 1}
+    half = np.sqrt(0.5)
+    found = world.closest_bodies([[0, 4, 0]] * 2, stick, [[1, 0, 0, 0], [half, half, 0, 0]])
+    np.testing.assert_allclose(found.distance, [2.75, 3.75], rtol=1e-6)
+    assert world.closest_body((0, 4, 0), stick, (half, half, 0, 0)).distance == found.distance[1]
+    assert world.closest_body((0, 1, 0), stick).distance == pytest.approx(-0.25)
 
 
 def test_a_cast_turns_the_solid(dtype):
@@ -863,6 +926,12 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 0)), jfpx.InvalidArgument, "direction"),
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), -1), jfpx.InvalidArgument, "distance"),
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), filter=3), jfpx.InvalidArgument, "filter is 3"),
+    (lambda w: w.closest_body((0, 0, 0), max_distance=-1), jfpx.InvalidArgument, "max_distance is -1"),
+    (lambda w: w.closest_body((0, 0, 0), {"type": "half_space"}), jfpx.InvalidArgument, "no solid"),
+    (lambda w: w.bodies_within((0, 0, 0), 1, filter=3), jfpx.InvalidArgument, "filter is 3"),
+    (lambda w: w.closest_bodies([[0, 0, 0]], max_distances=-1), jfpx.InvalidArgument, "query 0: max_"),
+    (lambda w: w.closest_bodies([[0, 0, 0]], None, np.zeros((3, 4))), jfpx.InvalidArgument, "3 rows"),
+    (lambda w: jfpx.World({}, hit_speed=0), jfpx.InvalidArgument, "hit_speed is 0"),
     (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32)),
      jfpx.InvalidArgument, "ray 0: .*direction"),
     (lambda w: w.cast_rays(np.zeros((2, 3), np.float32), np.zeros((1, 3), np.float32)),

@@ -33,10 +33,10 @@ class FailingDevice final : public DeviceWorld {
       : device_(test::make_host_device_world(scene)), calls_(calls) {}
 
   void configure(const Scene& scene) noexcept override { device_->configure(scene); }
-  void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
-              soft_step::ContactSet* last) override {
+  void upload(const BodyStore& bodies, SubShapeTable* sub_shapes, soft_step::ContactSet* last,
+              bool keeps_velocities) override {
     count_call();
-    device_->upload(bodies, sub_shapes, last);
+    device_->upload(bodies, sub_shapes, last, keeps_velocities);
   }
   void upload_joints(JointStore* joints) override {
     count_call();

@@ -32,12 +32,12 @@ using test::operator""_r;
 class DeviceQueueTest : public testing::TestWithParam<test::DeviceKind> {
  protected:
   World on_device(const Scene& scene) const {
-    World world(scene, {.collider = {.backend = Backend::cpu}});
+    World world(scene, {.collider = {.backend = Backend::cpu}, .hit_speed = 0.5_r});
     WorldAccess::impl(world).device = GetParam().make(scene);
     return world;
   }
   static World on_host(const Scene& scene) {
-    return World(scene, {.collider = {.backend = Backend::cpu}});
+    return World(scene, {.collider = {.backend = Backend::cpu}, .hit_speed = 0.5_r});
   }
   /// A graph of steps, which the returned function launches.
   std::function<void()> graph_of(World* world, std::uint32_t steps) const {

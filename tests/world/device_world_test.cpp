@@ -45,12 +45,12 @@ struct Kind {
 class DeviceWorldTest : public testing::TestWithParam<Kind> {
  protected:
   World on_device(const Scene& scene) const {
-    World world(scene, {.collider = {.backend = Backend::cpu}});
+    World world(scene, {.collider = {.backend = Backend::cpu}, .hit_speed = 0.5_r});
     WorldAccess::impl(world).device = GetParam().make(scene);
     return world;
   }
   static World on_host(const Scene& scene) {
-    return World(scene, {.collider = {.backend = Backend::cpu}});
+    return World(scene, {.collider = {.backend = Backend::cpu}, .hit_speed = 0.5_r});
   }
 
  private:
@@ -519,6 +519,7 @@ TEST_P(DeviceWorldTest, BodiesComeAndGoOnTheDevice) {
         }
         if (!asks_between) continue;
         ASSERT_EQ(host.state_hash(), device.state_hash()) << "scene " << k << ", step " << n;
+        ASSERT_NO_FATAL_FAILURE(expect_equal_contacts(host, device)) << "step " << n;
         for (const BodyId id : host.bodies()) ASSERT_EQ(host.awake(id), device.awake(id));
       }
       if (random.below(8) == 0) {

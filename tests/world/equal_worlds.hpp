@@ -31,6 +31,8 @@ inline void expect_equal_contacts(const World& host, const World& device) {
   ASSERT_EQ(std::vector(a.begin(), a.end()), std::vector(b.begin(), b.end()));
   const auto c = host.contact_events(), d = device.contact_events();
   ASSERT_EQ(std::vector(c.begin(), c.end()), std::vector(d.begin(), d.end()));
+  const auto e = host.hit_events(), f = device.hit_events();
+  ASSERT_EQ(std::vector(e.begin(), e.end()), std::vector(f.begin(), f.end()));
 }
 
 /// Copies the contacts of the solver from a device, so that later steps have them on the host.

@@ -40,6 +40,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/force_registry_test.cpp
   world/force_test.cpp
   world/frame_joint_test.cpp
+  world/hit_events_test.cpp
   world/joint_test.cpp
   world/joint_world_test.cpp
   world/kinematic_test.cpp

@@ -18,6 +18,8 @@ struct DetectedContacts {
   std::size_t sphere_count = 0;    ///< number of contacts of two spheres in `contacts`
   std::vector<Contact> generated;  ///< contacts of contact generators
   std::vector<Vec3> position;      ///< [m], by body, at the start of the step
+  /// [m/s], [rad/s], by body, at the start of the step; only in worlds with hit events
+  std::vector<Vec3> velocity, angular_velocity;
 };
 
 }  // namespace JFPX_ABI

@@ -28,12 +28,14 @@ struct StepContacts {
     events.invalidate();
     by_body.invalidate();
     forces.invalidate();
+    hits.invalidate();
   }
   /// Stores the contacts of the last step as those of the step before.
   void begin_detection() noexcept {
     swap_steps();
     last.invalidate();
     forces.invalidate();
+    hits.invalidate();
     state = State::found;
   }
   void complete_step() noexcept { shows_list = shows_events = has_forces = true; }
@@ -58,10 +60,12 @@ struct StepContacts {
   ContactsByBody by_body;                  ///< of `last`
   ContactEvents events;                    ///< of both
   Lazy<std::vector<ContactForce>> forces;  ///< of the contacts of `last`
+  Lazy<std::vector<HitEvent>> hits;        ///< of the contacts of `last`
   State state = State::kept;
   /// Whether World::contacts() returns `last`: not after a body was added or removed.
   bool shows_list = false;
-  bool shows_events = false;  ///< whether World::contact_events() compares both lists
+  bool shows_events = false;  ///< whether World::contact_events() compares both lists, and
+                              ///< hit_events() shows `hits`
   /// Whether World::contact_forces() has those of the contacts: not after restore(), because a
   /// snapshot has no arms.
   bool has_forces = false;

@@ -43,10 +43,17 @@ struct CommitProgram {
     ContinuousCollision{d.step, d.swept_bounds.sub_shapes, d.trees}.run(
         team, bodies.count, [&](std::uint32_t i) { return bodies.ids[i].index; },
         &d.counters->any_fast);
-    Vec3* const position_before = d.now().position_before;
+    const DeviceContacts& now = d.now();
+    Vec3* const position_before = now.position_before;
+    Vec3* const velocity_before = now.velocity_before;
+    Vec3* const angular_velocity_before = now.angular_velocity_before;
     team.for_each(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       position_before[body] = bodies.position[body];
+      if (velocity_before != nullptr) {
+        velocity_before[body] = bodies.velocity[body];
+        angular_velocity_before[body] = bodies.angular_velocity[body];
+      }
       if (d.step.store(body)) d.counters->any_rests = 1;
     });
     if (d.counters->any_rests != 0) d.islands().put_to_sleep(team);

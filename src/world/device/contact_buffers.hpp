@@ -39,6 +39,8 @@ class ContactBuffers {
     put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, room);
   }
 
+  /// Whether the velocities before a step are stored, for the steps after reserve().
+  void keep_velocities(bool keeps) { keeps_velocities_ = keeps; }
   /// Reserves memory for the contacts of the next step, and keeps those of the last step.
   /// @param room number of slots of bodies, as in the last upload
   void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room) {
@@ -55,6 +57,9 @@ class ContactBuffers {
     transfer.room(&spheres_of_, room);
     transfer.room(&manifolds_of_, room);
     transfer.room(&position_before_, room);
+    if (!keeps_velocities_) return;
+    transfer.room(&velocity_before_, room);
+    transfer.room(&angular_velocity_before_, room);
   }
   /// Records the contact counts of a completed step. @param slots of bodies in the step
   void complete(const ContactSizes& sizes, std::size_t slots) {
@@ -68,7 +73,9 @@ class ContactBuffers {
             spheres_of_.data(),
             manifolds_of_.data(),
             touches_.data(),
-            position_before_.data()};
+            position_before_.data(),
+            keeps_velocities_ ? velocity_before_.data() : nullptr,
+            keeps_velocities_ ? angular_velocity_before_.data() : nullptr};
   }
   const ContactSizes& sizes() const { return sizes_; }
   Touch* touches() const { return touches_.data(); }
@@ -97,6 +104,12 @@ class ContactBuffers {
     detected->position.resize(slots_);
     transfer.get(&touches, touches_);
     transfer.get(&detected->position, position_before_);
+    if (keeps_velocities_) {
+      detected->velocity.resize(slots_);
+      detected->angular_velocity.resize(slots_);
+      transfer.get(&detected->velocity, velocity_before_);
+      transfer.get(&detected->angular_velocity, angular_velocity_before_);
+    }
     transfer.wait();
     std::ranges::sort(
         touches, {}, [](const Touch& t) { return std::tuple(1 - t.of_spheres, t.pair, t.number); });
@@ -147,7 +160,8 @@ class ContactBuffers {
   Buffer<std::uint8_t> colors_;
   Buffer<Range> spheres_of_, manifolds_of_;
   Buffer<Touch> touches_;
-  Buffer<Vec3> position_before_;
+  Buffer<Vec3> position_before_, velocity_before_, angular_velocity_before_;
+  bool keeps_velocities_ = false;
   ContactSizes sizes_;
   std::size_t slots_ = 0;  ///< of bodies in the step
 };

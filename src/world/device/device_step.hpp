@@ -65,8 +65,8 @@ class DeviceStep final : public DeviceWorld {
     data_.swept_bounds.largest_margin = scene.soft_step.speculative_margin * Real(0.5);
   }
 
-  void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
-              soft_step::ContactSet* last) override {
+  void upload(const BodyStore& bodies, SubShapeTable* sub_shapes, soft_step::ContactSet* last,
+              bool keeps_velocities) override {
     if (bodies.capacity() > room_) {
       room_ = room_ == 0 ? bodies.capacity() : bodies.capacity() + bodies.capacity() / 2;
     }
@@ -79,6 +79,7 @@ class DeviceStep final : public DeviceWorld {
     update_trees(bodies);
     known_ = sent_ = {};
     last_contacts().upload(transfer_, last->view(), room_);
+    for (Contacts& contacts : contacts_) contacts.keep_velocities(keeps_velocities);
     known_.contacts[1 - now()] = last_contacts().sizes();
     Counters counters;
     counters.progress = known_;

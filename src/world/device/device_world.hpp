@@ -70,8 +70,9 @@ class DeviceWorld {
   virtual void configure(const Scene& scene) noexcept = 0;
   /// Replaces the state on the device.
   /// @param last contacts of the last step, with their impulses and colors
+  /// @param keeps_velocities whether fetch_contacts() shall copy the velocities before a step
   virtual void upload(const BodyStore& bodies, SubShapeTable* sub_shapes,
-                      soft_step::ContactSet* last) = 0;
+                      soft_step::ContactSet* last, bool keeps_velocities) = 0;
   /// Replaces forces, torques and awake flags.
   virtual void upload_forces(const BodyStore& bodies) = 0;
   /// Replaces the joints and their impulses of the last step. upload() must precede. Waits.

@@ -145,6 +145,8 @@ struct DeviceContacts {
   Range* manifolds_of = nullptr;  ///< by body a
   Touch* touches = nullptr;
   Vec3* position_before = nullptr;  ///< by body, at the start of the step
+  /// The same; null in worlds without hit events.
+  Vec3 *velocity_before = nullptr, *angular_velocity_before = nullptr;
 };
 
 /// The joints on the device.
