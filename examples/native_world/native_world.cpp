@@ -125,6 +125,11 @@ int main() {
       is_solid);
   if (below) std::printf("a ball falls by %.2f m\n", static_cast<double>(below->fraction * 10));
 
+  // The closest body to a point, up to 5 m.
+  const std::optional<jfpx::BodyDistance> closest =
+      world.closest_body({.position = {0, 4, 0}, .max_distance = 5}, is_solid);
+  if (closest) std::printf("%.2f m to the closest body\n", static_cast<double>(closest->distance));
+
   for (const jfpx::BodyId id : world.overlapping(jfpx::Sphere{Real(1.5)}, {-3, 6, 3})) {
     if (id == lamp) std::printf("the lamp hangs near its hook\n");
   }

@@ -2,6 +2,7 @@
 /// fixed step that is interpolated for drawing. docs/porting.md has the terms of other engines.
 #include <jfpx/world.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <optional>
@@ -45,7 +46,7 @@ bool is_on_ground(const jfpx::World& world, jfpx::BodyId player) {
 int main() {
   jfpx::Scene scene;  // steps of 1/60 s, gravity (0, -9.81, 0) in each BodyDef
   scene.bodies.push_back(body(jfpx::Box{{20, 1, 20}}, {0, -1, 0}, 0, {kLevel}));
-  jfpx::World world(scene);
+  jfpx::World world(scene, {.hit_speed = 1});
 
   jfpx::BodyDef platform = body(jfpx::Box{{2, Real(0.1), 2}}, {8, Real(0.1), 0}, 0, {kLevel});
   platform.kinematic = true;
@@ -75,11 +76,12 @@ int main() {
   coin.user_data = 42;  // an index of the game's own objects
   world.add(coin);
 
-  const jfpx::BodyId crate = world.add(body(jfpx::Box{{1, 1, 1}}, {0, 1, -6}, 30, {kDebris}));
+  const jfpx::BodyId crate = world.add(body(jfpx::Box{{1, 1, 1}}, {0, 3, -6}, 30, {kDebris}));
 
   constexpr Real kDt = Real(1) / 60;
   Real accumulator = 0;
   jfpx::Vec3 before, after;
+  Real loudest = 0;                            // [m/s]
   for (int frame = 0; frame < 288; ++frame) {  // 144 frames per second
     accumulator += Real(1) / 144;
     while (accumulator >= kDt) {
@@ -106,12 +108,17 @@ int main() {
           if (world.contains(id) && world.sensor(id)) taken.push_back(id);
         }
       }
+      // Impacts of at least 1 m/s, for sounds and damage.
+      for (const jfpx::HitEvent& hit : world.hit_events()) {
+        loudest = std::max(loudest, hit.approach_speed);
+      }
       for (const jfpx::BodyId id : taken) {
         std::printf("took object %llu\n", static_cast<unsigned long long>(world.user_data(id)));
         world.remove(id);
       }
     }
   }
+  std::printf("the loudest impact had %.1f m/s\n", static_cast<double>(loudest));
   const jfpx::Vec3 drawn = interpolate(before, after, accumulator / kDt);
   std::printf("the player is drawn at z = %.2f m\n", static_cast<double>(drawn.z));
   std::printf("the player %s\n", is_on_ground(world, player) ? "stands" : "falls");

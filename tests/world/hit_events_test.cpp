@@ -78,6 +78,7 @@ TEST(HitEvents, OfTwoBallsAreTheStepsInWhichTheyMeetFastEnough) {
     ball.mass = 1;
     ball.restitution = random.uniform(0, 1);
     ball.acceleration = {};
+    ball.can_sleep = false;
     Scene scene;
     scene.bodies = {ball, ball};
     scene.bodies[1].position = {random.uniform(1.1_r, 1.6_r), random.uniform(-0.9_r, 0.9_r), 0};
@@ -93,6 +94,7 @@ TEST(HitEvents, OfTwoBallsAreTheStepsInWhichTheyMeetFastEnough) {
         ASSERT_TRUE(hits.empty()) << n;
         continue;
       }
+      ASSERT_FALSE(world.contacts().empty()) << n;
       const Vec3 normal = world.contacts()[0].normal;
       const Real speed = dot(before[1].velocity - before[0].velocity, normal);
       if (absolute(speed - 2) < 1e-3_r) continue;
