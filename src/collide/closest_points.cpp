@@ -49,7 +49,7 @@ Wide widest_axis(const CorePair& pair, const WidestAxis& closest) {
 }
 
 /// Two cores in the axes of the target, which is a.
-CorePair make_pair(const ConvexCore& target, const ConvexCore& solid, const Mat3& rotation,
+CorePair core_pair(const ConvexCore& target, const ConvexCore& solid, const Mat3& rotation,
                    const Vec3& offset) {
   CorePair pair{target, solid, WideMatrix(rotation), Wide(offset)};
   pair.size =
@@ -83,7 +83,7 @@ void replace_by_contact(const Manifold& contact, const CorePair& cores, const Tr
 
 ClosestPair find_closest(const ConvexCore& target, const ConvexCore& solid, const Mat3& rotation,
                          const Vec3& offset, Real limit) {
-  const CorePair pair = make_pair(target, solid, rotation, offset);
+  const CorePair pair = core_pair(target, solid, rotation, offset);
   const Wide solid_centre = pair.offset + pair.rotation * Wide(solid.centre);
   const Wide between = Wide(target.centre) - solid_centre;
   const double apart = length(between);
@@ -135,7 +135,7 @@ ClosestPair find_closest(const PosedSolid& target, const PosedSolid& solid, Real
   pair.normal = normalized(at.basis * pair.normal);
   if (pair.is_inside) {
     replace_by_contact(collide(solid.shape, solid.pose, target.shape, at),
-                       make_pair(target.core, solid.core, rotation, offset), at, &pair);
+                       core_pair(target.core, solid.core, rotation, offset), at, &pair);
   }
   return pair;
 }

@@ -88,13 +88,11 @@ TEST(HitEvents, OfTwoBallsAreTheStepsInWhichTheyMeetFastEnough) {
     for (int k = 0; k < 90; ++k) {
       const std::vector<BodyState> before = world.states();
       world.step();
-      const bool pushed = !(world.states()[0].velocity == before[0].velocity);
       const std::vector<HitEvent> hits = hits_of(world);
-      if (!pushed) {
+      if (world.contacts().empty() || world.states()[0].velocity == before[0].velocity) {
         ASSERT_TRUE(hits.empty()) << n;
         continue;
       }
-      ASSERT_FALSE(world.contacts().empty()) << n;
       const Vec3 normal = world.contacts()[0].normal;
       const Real speed = dot(before[1].velocity - before[0].velocity, normal);
       if (absolute(speed - 2) < 1e-3_r) continue;
@@ -157,14 +155,17 @@ TEST(HitEvents, OfBodiesOfAllShapesHaveTheSpeedsOfTheirPoints) {
         last = pair;
         EXPECT_FALSE(world.sensor(hit.a) || world.sensor(hit.b));
         EXPECT_GE(hit.approach_speed, 0.5_r);
-        // The points of bodies that were still apart are different points of both.
+        // Bodies that were still apart have the points of their impact, later in the step.
         const bool touched = std::ranges::any_of(world.contacts(), [&](const Contact& c) {
-          return c.distance < 0 && length(c.point - hit.point) < 1e-4_r;
+          const bool same = (c.a == hit.a && c.b == hit.b) || (c.a == hit.b && c.b == hit.a);
+          return same && c.distance < 0 && length(c.point - hit.point) < 1e-4_r;
         });
         const BodyState &a = before[hit.a.index], &b = before[hit.b.index];
-        const Real spin = length(a.angular_velocity) + length(b.angular_velocity);
+        const auto spin =
+            static_cast<double>(length(a.angular_velocity) + length(b.angular_velocity));
+        const auto motion = static_cast<double>(length(a.velocity) + length(b.velocity)) + 2 * spin;
         EXPECT_NEAR(static_cast<double>(hit.approach_speed), approach_of(hit, a, b),
-                    touched ? 1e-3 : 1e-3 + 0.1 * static_cast<double>(spin));
+                    1e-3 + spin * (touched ? 1e-3 : motion / 60));
         ++(touched ? overlaps : impacts);
         const auto events = world.contact_events();
         EXPECT_TRUE(std::ranges::any_of(events, [&](const ContactEvent& e) {
