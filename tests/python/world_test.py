@@ -927,7 +927,7 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), -1), jfpx.InvalidArgument, "distance"),
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), filter=3), jfpx.InvalidArgument, "filter is 3"),
     (lambda w: w.closest_body((0, 0, 0), max_distance=-1), jfpx.InvalidArgument, "max_distance is -1"),
-    (lambda w: w.closest_body((0, 0, 0), {"type": "half_space"}), jfpx.InvalidArgument, "no solid"),
+    (lambda w: w.closest_body((0, 0, 0), GROUND["shape"]), jfpx.InvalidArgument, "no solid"),
     (lambda w: w.bodies_within((0, 0, 0), 1, filter=3), jfpx.InvalidArgument, "filter is 3"),
     (lambda w: w.closest_bodies([[0, 0, 0]], max_distances=-1), jfpx.InvalidArgument, "query 0: max_"),
     (lambda w: w.closest_bodies([[0, 0, 0]], None, np.zeros((3, 4))), jfpx.InvalidArgument, "3 rows"),
