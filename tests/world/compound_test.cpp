@@ -45,7 +45,8 @@ Compound angle_iron() {
 }
 
 std::vector<Contact> find_contacts(const BodyStore& bodies, std::uint64_t* sphere_contacts) {
-  ContactFinder contact_finder(make_broad_phase(make_sphere_collider(), BroadPhase::cells));
+  ContactFinder contact_finder(make_broad_phase(make_sphere_collider(), BroadPhase::cells),
+                               SimdLevel::automatic);
   contact_finder.set_bodies(bodies);
   std::vector<Contact> contacts;
   *sphere_contacts = thesis::ContactSearch().find_contacts(bodies, &contact_finder, &contacts);
