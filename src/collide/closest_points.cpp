@@ -93,13 +93,14 @@ ClosestPair find_closest(const ConvexCore& target, const ConvexCore& solid, cons
     axis = dot(normal, axis) > 0 ? normal : -normal;
   }
   const double radii = sum_of_radii(pair);
-  // Distances are rounded to Real before they are compared with the limit.
-  const double enough =
-      static_cast<double>(limit) * (1 + static_cast<double>(kEpsilon)) + radii + pair.error();
+  // More than the errors of the distance that is compared with the limit, which is rounded to Real.
+  const double enough = static_cast<double>(limit) * (1 + static_cast<double>(kEpsilon)) + radii +
+                        pair.error() + 2 * tolerance_of(pair);
   WidestAxis closest = find_apart(pair, {}, axis, enough);
   if (closest.widest > enough) return {};
   ClosestPair result;
-  double between_cores = closest.distance;
+  // The closest point of a thin triangle may be too close by a rounding error.
+  double between_cores = std::max(closest.distance, closest.widest);
   const bool is_accurate = closest.distance - closest.widest <= tolerance_of(pair);
   if (closest.widest > (is_accurate ? pair.size * 0x1p-30 : pair.clear_gap())) {
     axis = widest_axis(pair, closest);
