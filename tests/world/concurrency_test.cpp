@@ -30,6 +30,7 @@ struct Results {
   std::vector<BodyId> touched;
   std::vector<Contact> contacts;
   std::vector<ContactForce> forces;
+  std::vector<HitEvent> impacts;
   std::size_t events = 0, awake = 0;
   Snapshot snapshot;
   friend bool operator==(const Results&, const Results&) = default;
@@ -45,6 +46,7 @@ Results query(const World& world) {
   results.touched = world.overlapping(Box{{1, 1, 1}}, {0, 0, 0});
   results.contacts.assign(world.contacts().begin(), world.contacts().end());
   results.forces.assign(world.contact_forces().begin(), world.contact_forces().end());
+  results.impacts.assign(world.hit_events().begin(), world.hit_events().end());
   results.events = world.contact_events().size();
   results.snapshot = world.snapshot();
   for (const BodyId id : world.bodies()) results.awake += world.awake(id) ? 1 : 0;
@@ -54,7 +56,7 @@ Results query(const World& world) {
 TEST_P(Concurrency, ConstFunctionsOfAWorldRunConcurrently) {
   const std::uint64_t seed = fresh_seed();
   SCOPED_TRACE(trace(seed));
-  World world(dense_scene(seed)), twin(dense_scene(seed));
+  World world(dense_scene(seed), {.hit_speed = 1}), twin(dense_scene(seed), {.hit_speed = 1});
   for (int n = 0; n < 20; ++n) {
     world.step();
     twin.step();
