@@ -60,8 +60,16 @@ case $step in
     for once in first second; do
       CUDACXX=$work/broken accepts -S "$root" -DJFPX_CUDA=AUTO
       said "Looking for a CUDA compiler" || fail "not the $once time: $(cat "$work/log")"
-      said "cuda off (no CUDA compiler was found that works" || fail "$(cat "$work/log")"
+      said "cuda off ($work/broken is not nvcc)" || fail "$(cat "$work/log")"
     done
+    rm -r "$work/build"
+    printf '#!/bin/sh\n[ "$1" = --version ] && echo "Cuda compilation tools, release 12.8, V12.8.1"\n' >"$work/new"
+    chmod +x "$work/new"
+    CUDACXX=$work/new accepts -S "$root" -DJFPX_VIEWER=OFF
+    log=$(sed -nE 's/.*new does not compile: see (CMakeFiles[^)]*)\)$/\1/p' "$work/log")
+    [ -s "$work/build/$log" ] || fail "no such log: \"$log\"; $(cat "$work/log")"
+    CUDACXX=$work/none accepts -S "$root" -DJFPX_VIEWER=OFF
+    said "cuda off (nvcc was not found)" || fail "$(cat "$work/log")"
     ;;
   # What is missing is named, with its package.
   missing)
