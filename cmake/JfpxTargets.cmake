@@ -17,6 +17,8 @@ target_compile_options(jfpx_warnings INTERFACE
   $<$<COMPILE_LANGUAGE:CXX>:$<IF:$<BOOL:${MSVC}>,/W3,-Wall;-Wextra;-Wconversion;-Wshadow>>
   # g++ reports members of private types in a source that another source includes.
   $<$<AND:$<COMPILE_LANG_AND_ID:CXX,GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
+  # g++ notes that it passes vectors of doubles as no version before 4.6 did.
+  $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-psabi>
   $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<BOOL:${JFPX_WERROR}>>:-Werror>)
 add_library(jfpx_build_flags INTERFACE)
 target_compile_features(jfpx_build_flags INTERFACE cxx_std_20)
