@@ -159,7 +159,7 @@ if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/docs)
   install(FILES ${PROJECT_SOURCE_DIR}/bench/python/neighbours.py
     DESTINATION ${CMAKE_INSTALL_DOCDIR}/bench/python COMPONENT doc)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc
-    PATTERN __pycache__ EXCLUDE)
+    PATTERN __pycache__ EXCLUDE PATTERN .clang-tidy EXCLUDE)
   install(FILES ${PROJECT_SOURCE_DIR}/packaging/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/packaging COMPONENT doc)
   # The site, if scripts/docs has built it.
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/build/docs/html DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT doc OPTIONAL)

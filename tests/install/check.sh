@@ -63,7 +63,11 @@ case $step in
 cpu compiled
 cuda $compiled
 refused" ] || fail "$("$work/cmake/both")"
-    if [ "$HAS_BULLET" = ON ]; then # the project that users copy
+    # The projects that users copy.
+    configure "$root/examples/native_world" "$work/native_world" >/dev/null
+    cmake --build "$work/native_world" >/dev/null
+    "$work/native_world/native_world" | grep -qx "the lamp has swung twice, with the same bits" || fail "examples/native_world"
+    if [ "$HAS_BULLET" = ON ]; then
       configure "$root/examples/bullet_app" "$work/bullet_app" >/dev/null
       cmake --build "$work/bullet_app" >/dev/null
       "$work/bullet_app/bullet_app" | grep -q '[1-9][0-9]* contacts of spheres' || fail "examples/bullet_app"
