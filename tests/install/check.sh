@@ -183,7 +183,8 @@ refused" ] || fail "$("$work/cmake/both")"
   # jfpx inside another project, by FetchContent.
   subproject)
     # The other project may compile sources together, which is also faster.
-    configure "$here/subproject" "$work/subproject" -DJFPX_CUDA=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 >/dev/null
+    configure "$here/subproject" "$work/subproject" -DJFPX_CUDA=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=16 >"$work/subproject.txt"
+    grep -qF "(static, not optimized: CMAKE_BUILD_TYPE is empty, " "$work/subproject.txt" || fail "$(cat "$work/subproject.txt")"
     cmake --build "$work/subproject" >/dev/null 2>&1
     "$work/subproject/careless" || fail "careless"
     unasked=$(find "$work/subproject" -name 'libjfpx-*') # double, Bullet, the module to preload
