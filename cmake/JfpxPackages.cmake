@@ -59,7 +59,7 @@ endif()
 _jfpx_describe_package(dev libjfpx-dev libdevel "${for_dev}" "rigid-body collision with the same bits everywhere: headers" "${text}")
 if(JFPX_HAS_VIEWER)
   # SDL loads them at run time, with or without a window.
-  set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "libegl1, libgl1-mesa-dri")
+  set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "libegl1, libgl1, libgl1-mesa-dri")
 endif()
 _jfpx_describe_package(tools jfpx-tools science "${libraries}" "commands of jfpx: run, compare, replay, view scenes"
   "${text} Also runs unmodified Bullet programs with it: jfpx preload.")

@@ -210,7 +210,7 @@ refused" ] || fail "$("$work/cmake/both")"
     depends jfpx-tools | grep -q 'libjfpx-thesis0.3 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
     if [ "$HAS_VIEWER" = ON ]; then
       depends jfpx-tools | grep -q libsdl2 || fail "jfpx-tools depends on: $(depends jfpx-tools)"
-      depends jfpx-tools Recommends | grep -q 'libegl1, libgl1-mesa-dri' ||
+      depends jfpx-tools Recommends | grep -qx 'libegl1, libgl1, libgl1-mesa-dri' ||
         fail "jfpx-tools recommends: $(depends jfpx-tools Recommends)"
     fi
     if [ "$HAS_BULLET" = ON ]; then
