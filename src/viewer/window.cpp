@@ -8,6 +8,7 @@
 #include <epoxy/gl.h>
 
 #include <cstring>
+#include <string_view>
 
 #if defined(__linux__)
 #include <dlfcn.h>
@@ -51,6 +52,15 @@ void keep_driver_for_leak_sanitizer() {
 #endif
 }
 
+/// True if SDL has taken a driver that shows nothing, without being told to by SDL_VIDEODRIVER: its
+/// last resort where it finds no display.
+bool shows_nothing() {
+  const char* driver = SDL_GetCurrentVideoDriver();
+  if (driver == nullptr || SDL_GetHint(SDL_HINT_VIDEODRIVER) != nullptr) return false;
+  const std::string_view name = driver;
+  return name == "offscreen" || name == "dummy" || name == "evdev";
+}
+
 }  // namespace
 
 int Window::started_ = 0;
@@ -61,6 +71,9 @@ Window::Window(const std::string& title, int width, int height, bool visible) {
   SDL_SetMainReady();
   if (SDL_Init(SDL_INIT_VIDEO) != 0) refuse("the viewer found no display");
   library_.reset(&started_);
+  if (visible && shows_nothing()) {
+    throw BackendUnavailable("the viewer found no display; --headless draws pictures without one");
+  }
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_MAJOR_VERSION, 3);
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_MINOR_VERSION, 3);
   SDL_GL_SetAttribute(SDL_GL_CONTEXT_PROFILE_MASK, SDL_GL_CONTEXT_PROFILE_CORE);
