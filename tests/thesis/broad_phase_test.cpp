@@ -229,7 +229,7 @@ TEST(BroadPhase, AllWaysFindTheSameContactsThroughInsertionsAndRemovals) {
     std::vector<ContactFinder> ways;
     for (const BroadPhase way :
          {BroadPhase::cells, BroadPhase::hierarchy, BroadPhase::brute_force}) {
-      ways.emplace_back(make_broad_phase(make_sphere_collider(), way));
+      ways.emplace_back(make_broad_phase(make_sphere_collider(), way), SimdLevel::automatic);
     }
     for (int change = 0; change < 40; ++change) {
       const bool remove = bodies.ids().size() > 2 && random.below(3) == 0;
