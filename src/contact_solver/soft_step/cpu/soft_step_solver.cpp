@@ -264,25 +264,32 @@ void SoftStepSolver::for_contacts(std::size_t part, const F& f) const {
     if (is_color(color)) f(contact, color);
   };
   const std::uint32_t spheres = setup_.contacts.sphere_count;
-  const auto visit_contacts = [&](std::uint32_t body) {
-    if (!first_sphere_.empty()) {
-      for (std::uint32_t i = first_sphere_[body]; i < first_sphere_[body + 1]; ++i) visit(i);
-    }
-    if (!first_manifold_.empty()) {
-      for (std::uint32_t i = first_manifold_[body]; i < first_manifold_[body + 1]; ++i) {
-        visit(spheres + i);
-      }
-    }
-  };
   const auto number = static_cast<std::uint32_t>(part);
   if (has_blocks_) {
+    const auto visit_contacts = [&](std::uint32_t body) {
+      if (!first_sphere_.empty()) {
+        for (std::uint32_t i = first_sphere_[body]; i < first_sphere_[body + 1]; ++i) visit(i);
+      }
+      if (!first_manifold_.empty()) {
+        for (std::uint32_t i = first_manifold_[body]; i < first_manifold_[body + 1]; ++i) {
+          visit(spheres + i);
+        }
+      }
+    };
     blocks_.for_bodies(part, visit_contacts,
                        [this](std::uint32_t body) { prefetch_contacts(body); });
   } else {
-    const std::size_t end = std::min((part + 1) * kBodiesPerPart, bodies_.size());
-    for (std::size_t body = part * kBodiesPerPart; body < end; ++body) {
-      if (bodies_[body].inverse_mass > 0) visit_contacts(static_cast<std::uint32_t>(body));
-    }
+    // Contacts are sorted by key.
+    const auto visit_range = [&](const auto* contacts, std::uint32_t count, std::uint32_t before) {
+      const auto* contact = std::lower_bound(
+          contacts, contacts + count, number,
+          [this](const auto& c, std::uint32_t other) { return part_of(c.key.a) < other; });
+      for (; contact != contacts + count && part_of(contact->key.a) == number; ++contact) {
+        visit(before + static_cast<std::uint32_t>(contact - contacts));
+      }
+    };
+    visit_range(setup_.contacts.spheres, spheres, 0);
+    visit_range(setup_.contacts.manifolds, setup_.contacts.manifold_count, spheres);
   }
   for (auto joint = std::ranges::lower_bound(joints_, PartJoint{number, 0});
        joint != joints_.end() && joint->part == number; ++joint) {
@@ -419,8 +426,10 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   any_rebound_.store(false, std::memory_order_relaxed);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
-  find_ranges(setup_.contacts.spheres, setup_.contacts.sphere_count, &first_sphere_);
-  find_ranges(setup_.contacts.manifolds, setup_.contacts.manifold_count, &first_manifold_);
+  if (has_blocks) {
+    find_ranges(setup_.contacts.spheres, setup_.contacts.sphere_count, &first_sphere_);
+    find_ranges(setup_.contacts.manifolds, setup_.contacts.manifold_count, &first_manifold_);
+  }
   list_joints();
   group_fixed();
   allocate_rows();
