@@ -51,7 +51,7 @@ def lost_bodies(name, states):
     x, y, z = positions.T
     ground = np.array([scenes.height(a, b) if abs(a) < 20 and abs(b) < 20 else 1e9
                        for a, b in zip(x, z)]) if name == "terrain" else np.zeros(len(y))
-    outside = y < ground - 0.5
+    outside = y < (-1e6 if name == "net" else ground - 0.5)
     if name in ("balls", "pit", "hulls"):
         outside |= (np.minimum(x, z) < -1) | (np.maximum(x, z) > 18)
     return int(np.sum(outside))
