@@ -297,13 +297,11 @@ class KeptEdges {
 
  private:
   struct Ends {
-    Ends(const HullInput& hull, typename S::Words edges) {
-      const std::uint32_t faces = hull.face_size, vertices = hull.vertex_size;
-      from = Points<S>::gather(hull.vertices, vertices, S::template get_byte<0>(edges));
-      to = Points<S>::gather(hull.vertices, vertices, S::template get_byte<1>(edges));
-      u = Points<S>::gather(hull.faces, faces, S::template get_byte<2>(edges));
-      v = Points<S>::gather(hull.faces, faces, S::template get_byte<3>(edges));
-    }
+    Ends(const HullInput& hull, typename S::Words edges)
+        : u(Points<S>::gather(hull.faces, hull.face_size, S::template get_byte<2>(edges))),
+          v(Points<S>::gather(hull.faces, hull.face_size, S::template get_byte<3>(edges))),
+          from(Points<S>::gather(hull.vertices, hull.vertex_size, S::template get_byte<0>(edges))),
+          to(Points<S>::gather(hull.vertices, hull.vertex_size, S::template get_byte<1>(edges))) {}
     Points<S> u, v, from, to;
   };
   void fill(std::uint32_t i, const Points<S>& u, const Points<S>& v, const Points<S>& from,
