@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <tuple>
 #include <vector>
 
@@ -208,7 +209,8 @@ TEST(HitEvents, RemainValidWhileBodiesComeAndGo) {
       const std::vector<HitEvent> hits = hits_of(asked);
       found += static_cast<int>(hits.size());
       for (World* world : {&asked, &changed}) {
-        if (world->bodies().size() > 20) world->remove(world->bodies()[run % 5]);
+        if (world->bodies().size() > 20)
+          world->remove(world->bodies()[static_cast<std::size_t>(run % 5)]);
         world->add(scene.bodies[3]);
         world->set_state(world->bodies()[4], {{9, 9, 9}, {}, {1, 2, 3}, {}});
         world->apply_impulse(world->bodies()[6], {100, 0, 0});
