@@ -128,10 +128,8 @@ class FrameLanes {
     const Orientation start = Orientation::load(sweep_.start_orientation, bodies);
     const Vec zero = S::set(0);
     const Mask is_isotropic = greater(inverse_inertia, zero);
-    const Mask is_free =
-        S::both(S::both(greater(inertia.row[0].x, zero), greater(inertia.row[1].y, zero)),
-                greater(inertia.row[2].z, zero));
-    const Mask turns = S::both(S::both(S::negate_mask(is_isotropic), is_free), now.differs(start));
+    const Mask keeps_inertia = S::either(is_isotropic, locks_rotation(inertia));
+    const Mask turns = S::both(S::negate_mask(keeps_inertia), now.differs(start));
     if (S::any(turns)) {
       const Matrix turn = to_matrix(now * start.conjugate());
       inertia = Matrix::select(turns, turn * (inertia * turn.transposed()), inertia);

@@ -61,11 +61,6 @@ class StartedLanes {
     const Vec linear = kFixed ? mass_a : mass_a + inverse_mass(b_);
     const auto inertia_a = Mat3Lanes<S>::load(setup_.inverse_inertia, a_);
     const auto inertia_b = kFixed ? inertia_a : Mat3Lanes<S>::load(setup_.inverse_inertia, b_);
-    const auto locks_rotation = [&](const Mat3Lanes<S>& inertia) {
-      return S::either(
-          S::either(S::less_equal(inertia.row[0].x, zero), S::less_equal(inertia.row[1].y, zero)),
-          S::less_equal(inertia.row[2].z, zero));
-    };
     const Mask is_locked = kFixed ? locks_rotation(inertia_a)
                                   : S::either(locks_rotation(inertia_a), locks_rotation(inertia_b));
     const Vec shared = linear * counts_;

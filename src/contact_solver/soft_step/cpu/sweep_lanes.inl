@@ -93,6 +93,15 @@ struct Mat3Lanes {
   }
 };
 
+/// soft_step::locks_rotation()
+template <class S>
+typename S::Mask locks_rotation(const Mat3Lanes<S>& inertia) {
+  const auto zero = S::set(0);
+  return S::negate_mask(
+      S::both(S::both(S::less(zero, inertia.row[0].x), S::less(zero, inertia.row[1].y)),
+              S::less(zero, inertia.row[2].z)));
+}
+
 /// A Quat of each lane.
 template <class S>
 struct OrientationLanes {
