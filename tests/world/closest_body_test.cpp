@@ -7,6 +7,7 @@
 #include "tests/collide/support_oracle.hpp"
 #include "tests/world/meshes.hpp"
 #include "tests/world/random_bodies.hpp"
+#include "tests/world/solid_queries.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,36 +21,11 @@ namespace {
 
 using ::testing::ElementsAre;
 
-constexpr Real kDistanceTolerance = sizeof(Real) == 4 ? 1e-5_r : 1e-13_r;
-
-void expect_equal_vectors(const Vec3& a, const Vec3& b, Real tolerance = kDistanceTolerance) {
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i], b[i], tolerance) << i;
-}
-
-BodyDef immovable(const Shape& shape, const Vec3& position = {}) {
-  BodyDef def;
-  def.shape = shape;
-  def.position = position;
-  def.mass = 0;
-  return def;
-}
-
-World world_of(std::vector<BodyDef> bodies) {
-  Scene scene;
-  scene.bodies = std::move(bodies);
-  return World(scene);
-}
-
-/// A point, and each solid that is 1 m high and about 1 m wide.
+/// A point, and all_solids().
 std::vector<SolidShape> point_and_solids() {
-  return {Sphere{0}, Sphere{0.5_r},          Box{{0.4_r, 0.5_r, 0.3_r}}, Capsule{0.25_r, 0.25_r},
-          Hull{},    Cylinder{0.4_r, 0.5_r}, Cone{0.4_r, 0.5_r}};
-}
-/// [m], from the origin to the lowest point.
-Real depth_below(const SolidShape& solid) {
-  const Sphere* ball = std::get_if<Sphere>(&solid);
-  if (ball != nullptr) return ball->radius;
-  return std::holds_alternative<Cone>(solid) ? 0.25_r : 0.5_r;
+  std::vector<SolidShape> solids = all_solids();
+  solids.insert(solids.begin(), Sphere{0});
+  return solids;
 }
 
 TriangleMeshDef square_sheet(Real half) {
@@ -75,28 +51,28 @@ TEST(ClosestBody, IsAsFarAsEachSolidIsAboveEachFloor) {
                                                       {tiles, {0, -1, 0}},
                                                       {Cylinder{3, 1}, {0, -1, 0}}};
   for (std::size_t i = 0; i < floors.size(); ++i) {
-    const World world = world_of({immovable(floors[i].first, floors[i].second)});
+    const World world = query_world({fixed_body(floors[i].first, floors[i].second)});
     for (const SolidShape& solid : point_and_solids()) {
       SCOPED_TRACE(testing::Message() << "floor " << i << ", solid " << solid.index());
       const Vec3 from{0.3_r, 2 + depth_below(solid), -0.2_r};
       const auto found = world.closest_body({from, solid});
       ASSERT_TRUE(found);
       EXPECT_EQ(found->body, world.bodies()[0]);
-      EXPECT_NEAR(found->distance, 2, kDistanceTolerance);
-      expect_equal_vectors(found->normal, {0, 1, 0});
-      EXPECT_NEAR(found->point.y, 0, kDistanceTolerance);
-      EXPECT_NEAR(found->query_point.y, 2, kDistanceTolerance);
+      EXPECT_NEAR(found->distance, 2, kQueryTolerance);
+      expect_near_vector(found->normal, {0, 1, 0});
+      EXPECT_NEAR(found->point.y, 0, kQueryTolerance);
+      EXPECT_NEAR(found->query_point.y, 2, kQueryTolerance);
       // Below the solid.
-      EXPECT_LE(absolute(found->point.x - from.x), 0.5_r + kDistanceTolerance);
-      EXPECT_LE(absolute(found->point.z - from.z), 0.5_r + kDistanceTolerance);
+      EXPECT_LE(absolute(found->point.x - from.x), 0.5_r + kQueryTolerance);
+      EXPECT_LE(absolute(found->point.z - from.z), 0.5_r + kQueryTolerance);
       EXPECT_TRUE(world.closest_body({from, solid, {}, 2.001_r}));
       EXPECT_FALSE(world.closest_body({from, solid, {}, 1.999_r}));
       if (depth_below(solid) == 0) continue;
       const Vec3 inside{0.3_r, depth_below(solid) - 0.05_r, -0.2_r};
       const auto overlap = world.closest_body({inside, solid, {}, 0});
       ASSERT_TRUE(overlap);
-      EXPECT_NEAR(overlap->distance, -0.05_r, kDistanceTolerance);
-      expect_equal_vectors(overlap->normal, {0, 1, 0}, 1e-3_r);
+      EXPECT_NEAR(overlap->distance, -0.05_r, kQueryTolerance);
+      expect_near_vector(overlap->normal, {0, 1, 0}, 1e-3_r);
       EXPECT_NEAR(overlap->point.y, 0, 1e-4);
       EXPECT_NEAR(overlap->query_point.y, -0.05_r, 1e-4);
     }
@@ -104,15 +80,15 @@ TEST(ClosestBody, IsAsFarAsEachSolidIsAboveEachFloor) {
 }
 
 TEST(ClosestBody, OfAPointInsideABodyHasTheDepthOfThePoint) {
-  const World world = world_of({immovable(Box{{1, 2, 3}}), immovable(Sphere{4}, {0, 0, 1})});
+  const World world = query_world({fixed_body(Box{{1, 2, 3}}), fixed_body(Sphere{4}, {0, 0, 1})});
   const auto found = world.bodies_within({{0.75_r, 0, 0}, Sphere{0}, {}, 0});
   ASSERT_EQ(found.size(), 2u);
   EXPECT_EQ(found[0].body, world.bodies()[1]);
-  EXPECT_NEAR(found[0].distance, 1.25_r - 4, kDistanceTolerance);
-  EXPECT_NEAR(found[1].distance, -0.25_r, kDistanceTolerance);
-  expect_equal_vectors(found[1].normal, {1, 0, 0});
-  expect_equal_vectors(found[1].point, {1, 0, 0});
-  expect_equal_vectors(found[1].query_point, {0.75_r, 0, 0});
+  EXPECT_NEAR(found[0].distance, 1.25_r - 4, kQueryTolerance);
+  EXPECT_NEAR(found[1].distance, -0.25_r, kQueryTolerance);
+  expect_near_vector(found[1].normal, {1, 0, 0});
+  expect_near_vector(found[1].point, {1, 0, 0});
+  expect_near_vector(found[1].query_point, {0.75_r, 0, 0});
   EXPECT_EQ(world.closest_body({{0.75_r, 0, 0}})->body, world.bodies()[1]);
 }
 
@@ -120,19 +96,19 @@ TEST(ClosestBody, OneSidedTrianglesCountFromTheFrontOnly) {
   TriangleMeshDef sheet = square_sheet(4);
   for (const bool two_sided : {false, true}) {
     sheet.two_sided = two_sided;
-    const World world = world_of({immovable(TriangleMesh(sheet))});
+    const World world = query_world({fixed_body(TriangleMesh(sheet))});
     ASSERT_TRUE(world.closest_body({{0, 3, 0}, Capsule{}}));
     const auto below = world.closest_body({{0, -3, 0}, Capsule{}});
     ASSERT_EQ(below.has_value(), two_sided);
-    if (two_sided) expect_equal_vectors(below->normal, {0, -1, 0});
+    if (two_sided) expect_near_vector(below->normal, {0, -1, 0});
   }
 }
 
 TEST(ClosestBody, WithinADistanceAreSortedByDistanceAndThenByIndex) {
   std::vector<BodyDef> bodies;
   for (const Real x : {Real(6), Real(3), Real(9), Real(-3)})
-    bodies.push_back(immovable(Box{}, {x, 0, 0}));
-  const World world = world_of(bodies);
+    bodies.push_back(fixed_body(Box{}, {x, 0, 0}));
+  const World world = query_world(bodies);
   const auto ids = world.bodies();
   std::vector<BodyId> found;
   // A body exactly at the distance counts.
@@ -182,9 +158,9 @@ TEST(ClosestBody, OfAMeshIsTheClosestTriangle) {
     }
     for (std::uint32_t i = 0; i < 20; ++i) mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
     mesh.two_sided = true;
-    BodyDef body = immovable(TriangleMesh(mesh), random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
+    BodyDef body = fixed_body(TriangleMesh(mesh), random.uniform_in_box({-1, -1, -1}, {1, 1, 1}));
     body.orientation = random_rotation(&random);
-    const World world = world_of({body});
+    const World world = query_world({body});
     const Transform pose = make_transform(body.orientation, body.position);
     for (int i = 0; i < 20; ++i) {
       DistanceQuery query{random.uniform_in_box({-5, -5, -5}, {5, 5, 5})};

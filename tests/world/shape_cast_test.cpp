@@ -4,6 +4,7 @@
 
 #include "tests/world/meshes.hpp"
 #include "tests/world/random_bodies.hpp"
+#include "tests/world/solid_queries.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,39 +16,14 @@ namespace jfpx {
 namespace {
 
 using test::operator""_r;
+using test::all_solids;
+using test::depth_below;
+using test::expect_near_vector;
+using test::fixed_body;
 using test::kInfinity;
 using test::kNan;
+using test::query_world;
 using ::testing::ElementsAre;
-
-constexpr Real kCastTolerance = sizeof(Real) == 4 ? 1e-5_r : 1e-13_r;
-
-void expect_near_vector(const Vec3& a, const Vec3& b, Real tolerance = kCastTolerance) {
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a[i], b[i], tolerance) << i;
-}
-
-BodyDef fixed_body(const Shape& shape, const Vec3& position = {}) {
-  BodyDef def;
-  def.shape = shape;
-  def.position = position;
-  def.mass = 0;
-  return def;
-}
-
-World cast_world(std::vector<BodyDef> bodies) {
-  Scene scene;
-  scene.bodies = std::move(bodies);
-  return World(scene);
-}
-
-/// Each solid that is 1 m high and about 1 m wide.
-std::vector<SolidShape> all_solids() {
-  return {Sphere{0.5_r}, Box{{0.4_r, 0.5_r, 0.3_r}}, Capsule{0.25_r, 0.25_r},
-          Hull{},        Cylinder{0.4_r, 0.5_r},     Cone{0.4_r, 0.5_r}};
-}
-/// [m], from the origin to the lowest point.
-Real depth_of(const SolidShape& solid) {
-  return std::holds_alternative<Cone>(solid) ? 0.25_r : 0.5_r;
-}
 
 TEST(CastShape, OfEachSolidLandsOnEachFloor) {
   TriangleMeshDef sheet;
@@ -64,20 +40,20 @@ TEST(CastShape, OfEachSolidLandsOnEachFloor) {
       {Box{{4, 1, 4}}, {0, -1, 0}},  {TriangleMesh(sheet), {}},   {Heightfield(grid), {}},
       {tiles, {0, -1, 0}},           {Cylinder{3, 1}, {0, -1, 0}}};
   for (std::size_t i = 0; i < floors.size(); ++i) {
-    const World world = cast_world({fixed_body(floors[i].first, floors[i].second)});
+    const World world = query_world({fixed_body(floors[i].first, floors[i].second)});
     for (const SolidShape& solid : all_solids()) {
       SCOPED_TRACE(testing::Message() << "floor " << i << ", solid " << solid.index());
-      const Vec3 from{0.3_r, 5 + depth_of(solid), -0.2_r};
+      const Vec3 from{0.3_r, 5 + depth_below(solid), -0.2_r};
       const auto hit = world.cast_shape({solid, from, {}, {0, -20, 0}});
       ASSERT_TRUE(hit);
       EXPECT_EQ(hit->body, world.bodies()[0]);
-      EXPECT_NEAR(hit->fraction, 0.25_r, kCastTolerance);
+      EXPECT_NEAR(hit->fraction, 0.25_r, test::kQueryTolerance);
       EXPECT_EQ(hit->distance, 0);
       expect_near_vector(hit->normal, {0, 1, 0});
-      EXPECT_NEAR(hit->point.y, 0, 2 * kCastTolerance);
+      EXPECT_NEAR(hit->point.y, 0, 2 * test::kQueryTolerance);
       // In the shadow of the solid.
-      EXPECT_LE(absolute(hit->point.x - from.x), 0.5_r + kCastTolerance);
-      EXPECT_LE(absolute(hit->point.z - from.z), 0.5_r + kCastTolerance);
+      EXPECT_LE(absolute(hit->point.x - from.x), 0.5_r + test::kQueryTolerance);
+      EXPECT_LE(absolute(hit->point.z - from.z), 0.5_r + test::kQueryTolerance);
       EXPECT_FALSE(world.cast_shape({solid, from, {}, {0, -4.99_r, 0}}));
       EXPECT_FALSE(world.cast_shape({solid, from, {}, {0, 20, 0}}));
       EXPECT_FALSE(world.cast_shape({solid, from, {}, {3, 0, 1}}));
@@ -109,8 +85,8 @@ TEST(CastShape, OfASphereIsARayToAnEnlargedShape) {
       enlarged.shape = HalfSpace{wall.normal, wall.offset + radius};
     }
     const Real size = length(translation);
-    const auto ray = cast_world({enlarged}).cast_ray({origin, translation, size});
-    const auto hit = cast_world({def}).cast_shape({Sphere{radius}, origin, {}, translation});
+    const auto ray = query_world({enlarged}).cast_ray({origin, translation, size});
+    const auto hit = query_world({def}).cast_shape({Sphere{radius}, origin, {}, translation});
     // A grazing hit may be missed by rounding.
     if (ray && dot(ray->normal, translation) > -0.01_r * size) continue;
     ASSERT_EQ(hit.has_value(), ray.has_value()) << run;
@@ -161,12 +137,12 @@ TEST(CastShape, HitsAtZeroWhatOverlapsAtTheStart) {
 TEST(CastShape, ThatStartsInAnOverlapHasTheNormalAndTheDistanceThatEndIt) {
   for (const SolidShape& solid : all_solids()) {
     SCOPED_TRACE(solid.index());
-    const World world = cast_world({fixed_body(Box{{4, 1, 4}}, {0, -1, 0})});
-    const Vec3 position{0, depth_of(solid) - 0.1_r, 0};
+    const World world = query_world({fixed_body(Box{{4, 1, 4}}, {0, -1, 0})});
+    const Vec3 position{0, depth_below(solid) - 0.1_r, 0};
     const auto hit = world.cast_shape({solid, position, {}, {0, 1, 0}});
     ASSERT_TRUE(hit);
     EXPECT_EQ(hit->fraction, 0);
-    EXPECT_NEAR(hit->distance, -0.1_r, kCastTolerance);
+    EXPECT_NEAR(hit->distance, -0.1_r, test::kQueryTolerance);
     expect_near_vector(hit->normal, {0, 1, 0}, 1e-3_r);
     EXPECT_EQ(world.overlapping(solid, position).size(), 1u);
     EXPECT_TRUE(world.overlapping(solid, position + hit->normal * 0.1001_r).empty());
@@ -175,7 +151,7 @@ TEST(CastShape, ThatStartsInAnOverlapHasTheNormalAndTheDistanceThatEndIt) {
 
 TEST(CastShape, ThatTouchesAtTheStartHitsOnlyWhatItMovesTowards) {
   // A gap of the size of the rounding errors.
-  const World world = cast_world({fixed_body(Box{{4, 1, 4}}, {0, -1, 0})});
+  const World world = query_world({fixed_body(Box{{4, 1, 4}}, {0, -1, 0})});
   const ShapeCast cast{Box{}, {0, 0.5_r + 4 * kEpsilon, 0}, {}, {}};
   const auto moved = [&](const Vec3& translation) {
     ShapeCast along = cast;
@@ -195,7 +171,7 @@ TEST(CastShape, OneSidedTrianglesAreHitFromTheFrontOnly) {
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
   for (const bool two_sided : {false, true}) {
     sheet.two_sided = two_sided;
-    const World world = cast_world({fixed_body(TriangleMesh(sheet))});
+    const World world = query_world({fixed_body(TriangleMesh(sheet))});
     const auto down = world.cast_shape({Capsule{}, {0, 3, 0}, {}, {0, -4, 0}});
     const auto up = world.cast_shape({Capsule{}, {0, -3, 0}, {}, {0, 4, 0}});
     ASSERT_TRUE(down);
@@ -207,26 +183,26 @@ TEST(CastShape, OneSidedTrianglesAreHitFromTheFrontOnly) {
 
 /// A character on stairs: a wall that is low enough, and what is above it.
 TEST(CastShape, AgainstAnEdgeHasTheNormalBetweenBothFaces) {
-  const World world = cast_world({fixed_body(Box{{1, 1, 4}})});
+  const World world = query_world({fixed_body(Box{{1, 1, 4}})});
   const Real half = square_root(0.5_r);
   const auto hit = world.cast_shape({Sphere{1}, {1 + 3, 1 + 3, 0.3_r}, {}, {-6, -6, 0}});
   ASSERT_TRUE(hit);
   expect_near_vector(hit->normal, {half, half, 0});
   expect_near_vector(hit->point, {1, 1, 0.3_r});
-  EXPECT_NEAR(hit->fraction, (3 - half) / 6, kCastTolerance);
+  EXPECT_NEAR(hit->fraction, (3 - half) / 6, test::kQueryTolerance);
 }
 
 TEST(CastShape, FarFromTheOriginAndFromTheTargetIsAsAccurateAsTheCoordinates) {
   for (const Real away : {1e3_r, 1e5_r, 1e7_r}) {
     const Vec3 centre{away, -away, away};
-    const World world = cast_world({fixed_body(Box{{4, 1, 4}}, centre)});
+    const World world = query_world({fixed_body(Box{{4, 1, 4}}, centre)});
     // At most the error of a coordinate.
     const Real error = 2 * away * kEpsilon;
     const auto hit = world.cast_shape({Sphere{0.5_r}, centre + Vec3{0, 16, 0}, {}, {0, -32, 0}});
     ASSERT_TRUE(hit) << away;
-    EXPECT_NEAR(hit->fraction * 32, 14.5_r, error + 4 * kCastTolerance) << away;
+    EXPECT_NEAR(hit->fraction * 32, 14.5_r, error + 4 * test::kQueryTolerance) << away;
     // A long way to a small body.
-    const World small = cast_world({fixed_body(Sphere{1}, {})});
+    const World small = query_world({fixed_body(Sphere{1}, {})});
     const auto passes = [&](Real beside) {
       return !small.cast_shape({Sphere{1}, {-away, beside, 0}, {}, {2 * away, 0, 0}});
     };
@@ -251,7 +227,7 @@ TEST(CastShape, OntoAHugeFloorIsAsAccurateAsOntoASmallOne) {
       floor.shape =
           Hull(std::vector<Vec3>{{-half, 0, -half}, {half, 0, -half}, {0, 0, half}, {0, -half, 0}});
     }
-    const World world = cast_world({floor});
+    const World world = query_world({floor});
     for (int run = 0; run < 500; ++run) {
       SCOPED_TRACE(run);
       const Vec3 from{random.uniform(-3, 3), random.uniform(1, 9), random.uniform(-3, 3)};
@@ -259,7 +235,7 @@ TEST(CastShape, OntoAHugeFloorIsAsAccurateAsOntoASmallOne) {
       const SolidShape solid = all_solids()[random.below(6)];
       const auto hit = world.cast_shape({solid, from, {}, by});
       ASSERT_TRUE(hit);
-      EXPECT_NEAR(from.y + hit->fraction * by.y, depth_of(solid), 10 * kCastTolerance);
+      EXPECT_NEAR(from.y + hit->fraction * by.y, depth_below(solid), 10 * test::kQueryTolerance);
       expect_near_vector(hit->normal, {0, 1, 0});
     }
   }
@@ -269,7 +245,7 @@ TEST(CastShape, ThroughSortsByFractionAndThenByIndex) {
   std::vector<BodyDef> bodies;
   for (const Real x : {Real(6), Real(3), Real(9), Real(3)})
     bodies.push_back(fixed_body(Box{}, {x, 0, 0}));
-  const World world = cast_world(bodies);
+  const World world = query_world(bodies);
   const auto ids = world.bodies();
   const ShapeCast cast{Capsule{}, {-3, 0, 0}, {}, {10, 0, 0}};
   std::vector<BodyId> found;
