@@ -5,8 +5,10 @@ Markdown: time of a step, and quality after the last one.
     peers.py                                              all engines that are installed, all scenes
     peers.py --scenes pit,hulls --engines jfpx,box3d --repeat 5
 
-Every run of an engine is a process of its own on a single CPU, so that it has one thread. The time is the
+Every run of an engine is a process of its own. With one thread, it runs on a single CPU, and the time is the
 processor time of this process during the step: a busy machine does not add to it, though it shares caches.
+With several threads, it runs on as many CPUs, and the time is that of a clock: nothing else may run, and
+engines without threads are left out.
 An engine that is not installed is left out, with the reason:
 
     jfpx     its Python module (docs/python.md)
@@ -42,10 +44,11 @@ def parse():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--engines", default=",".join(engines.NAMES), help="[%(default)s]")
     parser.add_argument("--scenes", default=",".join(scenes.SCENES), help="[%(default)s]")
+    parser.add_argument("--threads", type=int, default=1, help="number of threads of an engine [%(default)s]")
     parser.add_argument("--repeat", type=int, default=3, help="number of turns [%(default)s]")
     parser.add_argument("--steps", type=int, default=scenes.STEPS, help="of a run [%(default)s]")
     parser.add_argument("--limit", type=float, default=120, metavar="S",
-                        help="processor time after which a run ends early, and is not repeated [%(default)s]")
+                        help="time after which a run ends early, and is not repeated [%(default)s]")
     parser.add_argument("--label", action="append", default=[], metavar="ENGINE=TEXT",
                         help="text for the version of an engine, such as a commit")
     parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="also write all results to this file")
@@ -55,20 +58,25 @@ def parse():
         for name in chosen.split(","):
             if name not in known:
                 parser.error(f"{name} is unknown; known: {', '.join(known)}")
+    cpus = len(os.sched_getaffinity(0))
+    if not 1 <= options.threads <= cpus:
+        parser.error(f"--threads must be 1 to {cpus}, the number of CPUs")
     return options
 
 
 def run_here(engine, file, options):
     """Runs one scene with one engine, and writes times and last states."""
-    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    world = engines.load(engine)(scenes.SCENES[options.scenes][0]())
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-options.threads:])
+    scene, make = scenes.SCENES[options.scenes][0](), engines.load(engine)
+    world = make(scene, options.threads) if options.threads > 1 else make(scene)
+    clock = time.process_time if options.threads == 1 else time.perf_counter
     gc.collect()
     gc.disable()
     times = []
     while len(times) < options.steps and sum(times) < options.limit:
-        begin = time.process_time()
+        begin = clock()
         world.step()
-        times.append(time.process_time() - begin)
+        times.append(clock() - begin)
     np.savez(file, times=1e3 * np.array(times), **{f"s{i}": x for i, x in enumerate(world.states())})
 
 
@@ -76,7 +84,7 @@ def run(engine, name, options):
     with tempfile.TemporaryDirectory() as folder:
         file = f"{folder}/run.npz"
         command = [sys.executable, os.path.abspath(__file__), "--child", engine, file, "--scenes", name,
-                   "--steps", str(options.steps), "--limit", str(options.limit)]
+                   "--steps", str(options.steps), "--limit", str(options.limit), "--threads", str(options.threads)]
         environment = dict(os.environ, OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
         try:
             # A single step may exceed the limit.
@@ -151,6 +159,9 @@ def main():
     used = {}
     for name in options.engines.split(","):
         world = engines.load(name)
+        if options.threads > 1 and not world.threaded:
+            print(f"{world.name} is left out: it has one thread", file=sys.stderr, flush=True)
+            continue
         try:
             used[name] = (world.name, ", ".join(filter(None, (world.version(), labels.get(name)))))
         except engines.Unavailable as reason:
@@ -158,7 +169,7 @@ def main():
     load = os.getloadavg()[1]
     results = measure(options, used)
     print(f"{processor()}, {os.cpu_count()} CPUs, load {load:.1f} to {os.getloadavg()[1]:.1f}, "
-          f"{time.strftime('%Y-%m-%d')}, {options.steps} steps of 1/60 s, {options.repeat} turns\n")
+          f"{time.strftime('%Y-%m-%d')}, {options.steps} steps of 1/60 s, {options.repeat} turns, threads: {options.threads}\n")
     row("engine", "version", "settings")
     row(*["---"] * 3)
     for name, (title, version) in used.items():

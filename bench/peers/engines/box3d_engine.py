@@ -130,16 +130,17 @@ def library():
 class World:
     name = "Box3D"
     settings = "float; 4 substeps"
+    threaded = True
 
     @staticmethod
     def version():
         v = library().b3GetVersion()
         return f"{v.major}.{v.minor}.{v.revision}"
 
-    def __init__(self, scene):
+    def __init__(self, scene, threads=1):
         self.lib = lib = library()
         definition = lib.b3DefaultWorldDef()
-        definition.gravity, definition.worker_count = Vec3(0, -9.81, 0), 1
+        definition.gravity, definition.worker_count = Vec3(0, -9.81, 0), threads
         self.world = lib.b3CreateWorld(c.byref(definition))
         lib.b3World_EnableSleeping(self.world, c.c_bool(False))
         self.dt, self.hulls, self.bodies = c.c_float(scene["dt"]), {}, []

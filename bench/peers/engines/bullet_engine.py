@@ -40,6 +40,7 @@ def array(values):
 class World:
     name = "Bullet"
     settings = "float; 10 iterations (default)"
+    threaded = False
 
     @staticmethod
     def version():

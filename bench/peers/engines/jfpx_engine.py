@@ -8,6 +8,7 @@ from . import Unavailable, movable
 class World:
     name = "jfpx"
     settings = "float; 4 substeps"
+    threaded = True
 
     @staticmethod
     def version():
@@ -17,9 +18,9 @@ class World:
             raise Unavailable(f"the Python module of jfpx: {error}") from error
         return jfpx.__version__
 
-    def __init__(self, scene):
+    def __init__(self, scene, threads=1):
         import jfpx
-        self.world = jfpx.World(jfpx.Scene(scene), threads=1, backend="cpu")
+        self.world = jfpx.World(jfpx.Scene(scene), threads=threads, backend="cpu")
         self.rows = movable(scene)
 
     def step(self):

@@ -57,11 +57,17 @@ class Jobs(c.Structure):
                 ("max_concurrency", c.c_uint32), ("max_barriers", c.c_uint32)]
 
 
+class Pool(c.Structure):
+    """A job system with threads besides that of the caller."""
+    _fields_ = [("max_jobs", c.c_uint32), ("max_barriers", c.c_uint32), ("threads", c.c_int32)]
+
+
 POINTERS = """BroadPhaseLayerInterfaceTable_Create ObjectLayerPairFilterTable_Create
 ObjectVsBroadPhaseLayerFilterTable_Create PhysicsSystem_Create PhysicsSystem_GetBodyInterface
-JobSystemCallback_Create BoxShape_Create SphereShape_Create CapsuleShape_Create ConvexHullShapeSettings_Create
-ConvexHullShapeSettings_CreateShape MeshShapeSettings_Create2 MeshShapeSettings_CreateShape
-BodyCreationSettings_Create3 BodyInterface_CreateBody GroupFilterTable_Create PointConstraint_Create""".split()
+JobSystemCallback_Create JobSystemThreadPool_Create BoxShape_Create SphereShape_Create CapsuleShape_Create
+ConvexHullShapeSettings_Create ConvexHullShapeSettings_CreateShape MeshShapeSettings_Create2
+MeshShapeSettings_CreateShape BodyCreationSettings_Create3 BodyInterface_CreateBody GroupFilterTable_Create
+PointConstraint_Create""".split()
 
 
 def library():
@@ -86,13 +92,14 @@ def pointer(value):
 class World:
     name = "Jolt"
     settings = "float; 10 velocity and 2 position steps (default)"
+    threaded = True
 
     @staticmethod
     def version():
         library()
         return ""  # joltc does not tell it
 
-    def __init__(self, scene):
+    def __init__(self, scene, threads=1):
         self.lib = lib = library()
         lib.JPH_Init()
         layers = pointer(lib.JPH_BroadPhaseLayerInterfaceTable_Create(2, 2))
@@ -105,7 +112,8 @@ class World:
         self.system = pointer(lib.JPH_PhysicsSystem_Create(c.byref(settings)))
         lib.JPH_PhysicsSystem_SetGravity(self.system, c.byref(Vec3(0, -9.81, 0)))
         # The pool of joltc has at least one thread besides that of the caller.
-        self.jobs = pointer(lib.JPH_JobSystemCallback_Create(c.byref(Jobs(None, run_job, run_jobs, 1, 8))))
+        self.jobs = pointer(lib.JPH_JobSystemThreadPool_Create(c.byref(Pool(2048, 8, threads - 1))) if threads > 1
+                            else lib.JPH_JobSystemCallback_Create(c.byref(Jobs(None, run_job, run_jobs, 1, 8))))
         self.interface = pointer(lib.JPH_PhysicsSystem_GetBodyInterface(self.system))
         self.dt, self.shapes = c.c_float(scene["dt"]), {}
         groups = self.groups(scene)

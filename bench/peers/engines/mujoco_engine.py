@@ -29,6 +29,7 @@ class World:
     name = "MuJoCo"
     settings = ("double; 4 steps of 1/240 s; Newton (default), balls: CG; joints in reduced coordinates, with an "
                 "armature of 0.01 kg m^2; height field")
+    threaded = False
 
     @staticmethod
     def version():

@@ -10,6 +10,7 @@ from . import Unavailable, movable
 class World:
     name = "Rapier"
     settings = "float; 4 solver iterations (default)"
+    threaded = True
 
     @staticmethod
     def version():
@@ -18,10 +19,10 @@ class World:
         except importlib.metadata.PackageNotFoundError as error:
             raise Unavailable("the package rapier3d") from error
 
-    def __init__(self, scene):
+    def __init__(self, scene, threads=1):
         import rapier3d
         self.world = rapier3d.PhysicsWorld(gravity=(0.0, -9.81, 0.0))
-        self.world.set_num_threads(1)
+        self.world.set_num_threads(threads)
         self.world.integration_parameters.dt = scene["dt"]
         handles = []
         for body in scene["bodies"]:
