@@ -37,23 +37,31 @@ class TrapsMasked {
 #endif
 };
 
-/// The rounding, traps, flush-to-zero and status flags of a thread.
+/// The rounding, traps and flush-to-zero of a thread, and the status flags of its vector unit.
 class FloatingPointEnvironment {
  public:
+#if defined(__x86_64__)
+  // std::fegetenv() takes as long as a short loop of the thread pool: it stores and loads the whole
+  // environment of the x87 unit.
   /// That of the calling thread.
-  FloatingPointEnvironment() noexcept { std::fegetenv(&environment_); }
+  FloatingPointEnvironment() noexcept { asm volatile("fnstcw %0" : "=m"(x87_)); }
   /// Makes it that of the calling thread.
   void apply() const noexcept {
-    std::fesetenv(&environment_);
-#if defined(_WIN32) && defined(__x86_64__)
+    asm volatile("fldcw %0" : : "m"(x87_));
     _mm_setcsr(vector_);
-#endif
   }
 
  private:
+  std::uint16_t x87_ = 0;
+  unsigned vector_ = _mm_getcsr();
+#else
+  /// That of the calling thread.
+  FloatingPointEnvironment() noexcept { std::fegetenv(&environment_); }
+  /// Makes it that of the calling thread.
+  void apply() const noexcept { std::fesetenv(&environment_); }
+
+ private:
   std::fenv_t environment_{};
-#if defined(_WIN32) && defined(__x86_64__)
-  unsigned vector_ = _mm_getcsr();  // MinGW-w64's environment is that of the x87 unit alone
 #endif
 };
 

@@ -1,6 +1,7 @@
 /// Loops over a range in chunks of a fixed size, on a thread pool.
 #pragma once
 
+#include "src/base/spin_lock.hpp"
 #include "src/base/thread_pool.hpp"
 
 #include <algorithm>
@@ -9,6 +10,14 @@
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+
+/// Chunk size of a loop over `count` items: about 32 chunks, so that the threads divide even short
+/// loops, within limits. A thread has the same part of a list in all loops over it.
+/// @param least takes about a microsecond
+constexpr std::size_t chunk_size(std::size_t count, std::size_t least, std::size_t most) {
+  constexpr std::size_t kChunks = 32;
+  return std::clamp((count + kChunks - 1) / kChunks, least, most);
+}
 
 /// Calls body(first, last) for the chunks of [0, count), from any thread and in any order. All
 /// chunks but the last have `chunk` items; they do not depend on the number of threads.
@@ -30,7 +39,7 @@ void parallel_for(ThreadPool* pool, std::size_t count, std::size_t chunk, const 
 template <class Value, class Body, class Combine>
 Value parallel_reduce(ThreadPool* pool, std::size_t count, std::size_t chunk, const Value& identity,
                       const Body& body, const Combine& combine) {
-  std::mutex mutex;
+  SpinLock mutex;
   Value result = identity;
   parallel_for(pool, count, chunk, [&](std::size_t first, std::size_t last) {
     const Value value = body(first, last);

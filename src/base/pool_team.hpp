@@ -17,8 +17,7 @@ class PoolTeam {
   /// Calls f(i) for all i < n, in any order, and waits.
   template <class F>
   void for_each(std::uint32_t n, const F& f) const {
-    constexpr std::size_t kItemsPerChunk = 1024;
-    parallel_for(pool_, n, kItemsPerChunk, [&](std::size_t first, std::size_t last) {
+    parallel_for(pool_, n, chunk_size(n, 32, 256), [&](std::size_t first, std::size_t last) {
       for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) f(i);
     });
   }

@@ -38,7 +38,7 @@ constexpr auto kInterruption = std::chrono::microseconds(500);
 /// Time after an interruption in which workers poll only briefly: longer polling would take cores
 /// from threads with work.
 constexpr auto kCrowded = std::chrono::milliseconds(50);
-/// A count of chunks, and the number of their job in the other bits.
+/// A count of chunks, and the number of their job or phase in the other bits.
 constexpr unsigned kCountBits = 24;
 constexpr std::uint64_t kCount = (std::uint64_t{1} << kCountBits) - 1;
 /// Before this job number is exceeded, the process runs for a century.
@@ -50,6 +50,15 @@ constexpr std::uint64_t count_of(std::uint64_t value) { return value & kCount; }
 /// A thread takes this fraction of the remaining chunks, up to a limit: a descheduled thread delays
 /// the loop by its portion.
 constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
+/// Up to this number of chunks a thread, workers run their own chunks only: looking at the chunks
+/// of others takes longer than a short loop. The caller takes those that are left.
+constexpr std::uint64_t kFewChunks = 2;
+/// Polls before the caller does so.
+constexpr unsigned kPollsBeforeHelp = 16;
+/// Polls before a thread that waits for the end of a phase does so.
+constexpr unsigned kPollsOfPhase = 64;
+/// Count of chunks of a job with phases.
+constexpr std::uint64_t kHasPhases = kCount;
 
 }  // namespace
 
@@ -82,10 +91,11 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   std::exception_ptr run(const Loop& loop);
 
  private:
-  /// Part of a loop, limited to kCount chunks.
+  /// Part of a loop, limited to less than kCount chunks.
   struct Job {
     Loop loop;
     std::size_t first = 0;                 ///< number of the first chunk
+    std::uint64_t number = 0;              ///< of the job, or of its first phase
     FloatingPointEnvironment environment;  ///< of the calling thread
   };
   /// Chunks of a thread.
@@ -95,20 +105,29 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
     std::atomic<std::uint64_t> left{0};
     /// Those that this thread has completed, of any thread, as of_job(). Only it writes the value.
     alignas(64) std::atomic<std::uint64_t> done{0};
+    /// The job with phases whose data this worker may read, or 0.
+    std::atomic<std::uint64_t> joined{0};
   };
 
   static bool may_start(unsigned threads);
   static std::shared_ptr<Workers> start(unsigned threads);
 
   void run_job(const Job& job);
+  void run_phases(const Job& job);
+  std::uint64_t publish(const Job& job, std::uint64_t count);
+  void join(unsigned self, std::uint64_t published);
+  void take_phases(unsigned self, std::uint64_t number);
   void work(unsigned self);
   void wait_for_job(std::uint32_t* seen);
   void poll(std::uint32_t last);
+  bool is_short(std::uint64_t job) const { return count_of(job) <= kFewChunks * thread_count_; }
   void take_chunks(unsigned self, std::uint64_t job);
+  void take_chunks_of_others(unsigned self, std::uint64_t job, std::uint64_t* done);
   bool take_chunks_of(unsigned owner, unsigned self, std::uint64_t job, std::uint64_t* done);
-  void run_chunks(std::size_t first, std::uint64_t count);
+  void run_chunks(std::uint64_t job, std::size_t first, std::uint64_t count);
   void report(unsigned self, std::uint64_t done);
   bool is_complete(std::uint64_t job) const;
+  bool has_ended(std::uint64_t phase) const;
   std::uint64_t first_chunk(std::uint64_t chunks, unsigned owner) const;
 
   /// Workers that pools may share.
@@ -118,18 +137,19 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   Workers* next_ = nullptr;
   std::thread::id creator_ = std::this_thread::get_id();
 
-  /// The current job. A thread may read it only between taking a chunk and reporting it, because
-  /// the next job overwrites it.
-  Job job_;
   unsigned requested_, thread_count_ = 1;
   unsigned polls_ = 0;                ///< number of polls before a worker sleeps
   std::unique_ptr<Chunks[]> chunks_;  ///< by thread; 0 is the caller
   std::atomic<bool> busy_{false};
   /// Since the epoch of the clock.
   std::atomic<Clock::duration> crowded_until_{Clock::duration::zero()};
+  // What starts a job is in one cache line.
   alignas(64) std::atomic<std::uint64_t> published_{0};  ///< number and chunks of the last job
   std::atomic<std::uint32_t> number_{0};                 ///< low bits of the number, to wait for
   std::atomic<bool> stopped_{false};
+  /// The current job. A thread may read it only between taking a chunk and reporting it, or after
+  /// it has joined, because the next job overwrites it.
+  Job job_;
   /// Whether the caller sleeps until all chunks are completed.
   alignas(64) std::atomic<std::uint32_t> caller_sleeps_{0};
 
@@ -236,26 +256,42 @@ ThreadPool::Workers::~Workers() {
 
 std::exception_ptr ThreadPool::Workers::run(const Loop& loop) {
   Job job;
+  job.loop = loop;
+  if (loop.phases > 0) run_phases(job);
   // Loops with more chunks than a job may have are split.
-  for (job.first = 0; job.first < loop.chunks; job.first += kCount) {
-    job.loop = loop;
-    job.loop.chunks = std::min<std::size_t>(loop.chunks - job.first, kCount);
+  constexpr std::size_t kMost = kCount - 1;
+  for (; job.first < loop.chunks; job.first += kMost) {
+    job.loop.chunks = std::min<std::size_t>(loop.chunks - job.first, kMost);
     run_job(job);
   }
   return std::exchange(error_, nullptr);
 }
 
-void ThreadPool::Workers::run_job(const Job& job) {
-  job_ = job;
+/// Starts the next job. @returns its number and `count`
+std::uint64_t ThreadPool::Workers::publish(const Job& job, std::uint64_t count) {
   const std::uint64_t number = number_of(published_.load(std::memory_order_relaxed)) + 1;
-  const std::uint64_t published = of_job(number, job.loop.chunks);
+  job_ = job;
+  job_.number = number;
+  const std::uint64_t published = of_job(number, count);
   published_.store(published, std::memory_order_release);
   number_.store(static_cast<std::uint32_t>(number));
   wake_all(number_);
-  take_chunks(0, published);
+  return published;
+}
+
+void ThreadPool::Workers::run_job(const Job& job) {
+  const std::uint64_t published = publish(job, job.loop.chunks);
+  std::uint64_t done = 0;
+  take_chunks_of(0, 0, published, &done);
+  bool has_helped = false;
   // Does not wait for workers without a chunk: on a loaded machine that would take longer than the
   // loop.
   for (unsigned i = 0; !is_complete(published); ++i) {
+    if (!has_helped && (!is_short(published) || i >= std::min(polls_, kPollsBeforeHelp))) {
+      take_chunks_of_others(0, published, &done);
+      has_helped = true;
+      continue;
+    }
     if (i < polls_) {
       pause();
       continue;
@@ -267,10 +303,53 @@ void ThreadPool::Workers::run_job(const Job& job) {
   caller_sleeps_.store(0, std::memory_order_relaxed);
 }
 
+/// Each phase has a number, as a job. The last one remains the number of the job.
+void ThreadPool::Workers::run_phases(const Job& job) {
+  const std::uint64_t number = number_of(publish(job, kHasPhases));
+  take_phases(0, number);
+  published_.store(of_job(number + job.loop.phases - 1, 0));
+  for (unsigned worker = 1; worker < thread_count_; ++worker) {
+    for (unsigned i = 0; chunks_[worker].joined.load() == number; ++i) {
+      i < kPolls ? pause() : std::this_thread::yield();
+    }
+  }
+}
+
+/// Takes part in a job with phases, unless it has ended. The caller waits for workers that have
+/// joined. @param published of the job
+void ThreadPool::Workers::join(unsigned self, std::uint64_t published) {
+  std::atomic<std::uint64_t>& joined = chunks_[self].joined;
+  joined.store(number_of(published));
+  if (published_.load() == published) take_phases(self, number_of(published));
+  joined.store(0, std::memory_order_release);
+}
+
+/// @param number of the first phase
+void ThreadPool::Workers::take_phases(unsigned self, std::uint64_t number) {
+  const Loop& loop = job_.loop;
+  for (std::size_t phase = 0; phase < loop.phases; ++phase) {
+    const std::uint64_t chunks = loop.chunks_of(loop.body, phase);
+    if (chunks == 0) continue;
+    const std::uint64_t job = of_job(number + phase, chunks);
+    std::uint64_t done = 0;
+    take_chunks_of(self, self, job, &done);
+    for (unsigned i = 0; !has_ended(job); ++i) {
+      // A worker that has not joined has left its chunks.
+      if (i == std::min(polls_, kPollsOfPhase)) take_chunks_of_others(self, job, &done);
+      i < polls_ ? pause() : std::this_thread::yield();
+    }
+  }
+}
+
 void ThreadPool::Workers::work(unsigned self) {
   std::uint32_t seen = 0;
   for (wait_for_job(&seen); !stopped_; wait_for_job(&seen)) {
-    take_chunks(self, published_.load(std::memory_order_acquire));
+    const std::uint64_t published = published_.load(std::memory_order_acquire);
+    if (count_of(published) == kHasPhases) {
+      join(self, published);
+    } else {
+      take_chunks(self, published);
+    }
   }
 }
 
@@ -315,12 +394,29 @@ bool ThreadPool::Workers::is_complete(std::uint64_t job) const {
   return sum == count_of(job);
 }
 
-/// Takes the chunks of thread `self`, then remaining chunks of other threads.
+/// Whether all chunks of a phase are completed. @param phase its number and chunks
+bool ThreadPool::Workers::has_ended(std::uint64_t phase) const {
+  std::uint64_t sum = 0;
+  for (unsigned thread = 0; thread < thread_count_; ++thread) {
+    const std::uint64_t done = chunks_[thread].done.load(std::memory_order_acquire);
+    if (number_of(done) > number_of(phase)) return true;
+    if (number_of(done) == number_of(phase)) sum += count_of(done);
+  }
+  return sum == count_of(phase);
+}
+
+/// Takes the chunks of worker `self`, then remaining chunks of other threads.
 /// @param job number and chunks
 void ThreadPool::Workers::take_chunks(unsigned self, std::uint64_t job) {
   std::uint64_t done = 0;
-  for (unsigned i = 0; i < thread_count_; ++i) {
-    if (!take_chunks_of((self + i) % thread_count_, self, job, &done)) return;
+  if (!take_chunks_of(self, self, job, &done) || is_short(job)) return;
+  take_chunks_of_others(self, job, &done);
+}
+
+void ThreadPool::Workers::take_chunks_of_others(unsigned self, std::uint64_t job,
+                                                std::uint64_t* done) {
+  for (unsigned i = 1; i < thread_count_; ++i) {
+    if (!take_chunks_of((self + i) % thread_count_, self, job, done)) return;
   }
 }
 
@@ -345,17 +441,20 @@ bool ThreadPool::Workers::take_chunks_of(unsigned owner, unsigned self, std::uin
     if (!value.compare_exchange_weak(left_of_job, of_job(number_of(job), left - taken))) continue;
     // Worker threads have the environment of the caller.
     if (self > 0 && *done == 0) job_.environment.apply();
-    run_chunks(job_.first + end - left, taken);
+    run_chunks(job, end - left, taken);
     *done += taken;
     report(self, of_job(number_of(job), *done));
     left_of_job = value.load();
   }
 }
 
-void ThreadPool::Workers::run_chunks(std::size_t first, std::uint64_t count) {
+/// @param job   number of the job or phase, and its chunks
+/// @param first chunk of the job
+void ThreadPool::Workers::run_chunks(std::uint64_t job, std::size_t first, std::uint64_t count) {
+  first += job_.first;
   for (std::size_t chunk = first; chunk < first + count; ++chunk) {
     try {
-      job_.loop.call(job_.loop.body, chunk);
+      job_.loop.call(job_.loop.body, number_of(job) - job_.number, chunk);
     } catch (...) {
       const std::lock_guard lock(error_mutex_);
       if (!error_ || chunk < error_chunk_) {
@@ -396,7 +495,10 @@ void ThreadPool::run_shared(const Loop& loop) {
   if (!workers_->acquire()) {
     std::shared_ptr<Workers> others = Workers::acquire_others(workers_->requested());
     if (others == nullptr) {
-      for (std::size_t i = 0; i < loop.chunks; ++i) loop.call(loop.body, i);
+      for (std::size_t phase = 0; phase < std::max<std::size_t>(loop.phases, 1); ++phase) {
+        const std::size_t chunks = loop.phases > 0 ? loop.chunks_of(loop.body, phase) : loop.chunks;
+        for (std::size_t i = 0; i < chunks; ++i) loop.call(loop.body, phase, i);
+      }
       return;
     }
     workers_ = std::move(others);

@@ -51,17 +51,49 @@ class JFPX_API ThreadPool {
       for (std::size_t i = 0; i < chunks; ++i) body(i);
       return;
     }
-    run_shared({.call = [](const void* b, std::size_t i) { (*static_cast<const Body*>(b))(i); },
+    run_shared({.call = [](const void* b, std::size_t,
+                           std::size_t i) { (*static_cast<const Body*>(b))(i); },
                 .body = &body,
                 .chunks = chunks});
+  }
+
+  /// Same as a loop for each phase, one after the other: calls body(phase, chunk) for every chunk
+  /// in [0, chunks_of(phase)). Threads that wait for the end of a phase poll, and begin the next
+  /// one without the caller, which takes less time than a loop.
+  /// @param chunks_of must return the same number for a phase in all calls, from any thread; it
+  /// must
+  ///   not throw
+  template <class Chunks, class Body>
+  void run_phases(std::size_t phases, const Chunks& chunks_of, const Body& body) {
+    if (workers_ == nullptr) {
+      for (std::size_t phase = 0; phase < phases; ++phase) {
+        const std::size_t chunks = chunks_of(phase);
+        for (std::size_t i = 0; i < chunks; ++i) body(phase, i);
+      }
+      return;
+    }
+    struct Functions {
+      const Chunks& chunks_of;
+      const Body& body;
+    };
+    const Functions functions{chunks_of, body};
+    run_shared({.call = [](const void* f, std::size_t phase,
+                           std::size_t i) { static_cast<const Functions*>(f)->body(phase, i); },
+                .body = &functions,
+                .chunks_of = [](const void* f, std::size_t phase) -> std::size_t {
+                  return static_cast<const Functions*>(f)->chunks_of(phase);
+                },
+                .phases = phases});
   }
 
  private:
   class Workers;
   struct Loop {
-    void (*call)(const void* body, std::size_t chunk) = nullptr;
+    void (*call)(const void* body, std::size_t phase, std::size_t chunk) = nullptr;
     const void* body = nullptr;
-    std::size_t chunks = 0;
+    std::size_t chunks = 0;  ///< of a loop without phases
+    std::size_t (*chunks_of)(const void* body, std::size_t phase) = nullptr;
+    std::size_t phases = 0;  ///< 0: a loop without phases
   };
 
   void run_shared(const Loop& loop);

@@ -2,6 +2,7 @@
 #include "src/base/thread_pool.hpp"
 
 #include "src/base/parallel_for.hpp"
+#include "tests/support/seed.hpp"
 
 #include <gtest/gtest.h>
 
@@ -16,6 +17,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <random>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -62,6 +64,37 @@ TEST(ThreadPool, ManyShortLoopsInARow) {
   std::vector<std::size_t> sums(3);
   for (std::size_t i = 0; i < 2000; ++i) pool.run(3, [&](std::size_t c) { sums[c] += i; });
   EXPECT_EQ(sums, std::vector<std::size_t>(3, 2000 * 1999 / 2));
+}
+
+/// A chunk begins after all chunks of the phases before it.
+TEST(ThreadPool, RunsPhasesOneAfterTheOther) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  for (const unsigned threads : {1u, 2u, 3u, 8u}) {
+    ThreadPool pool(threads);
+    std::uniform_int_distribution<std::size_t> few(0, 6), many(0, 8 * threads);
+    for (int round = 0; round < 300; ++round) {
+      std::vector<std::size_t> chunks(few(random));
+      std::size_t all = 0;
+      for (std::size_t& count : chunks) all += count = few(random) < 4 ? few(random) : many(random);
+      std::vector<std::size_t> before(chunks.size());
+      std::exclusive_scan(chunks.begin(), chunks.end(), before.begin(), std::size_t{0});
+      std::vector<int> runs(all);
+      std::atomic<std::size_t> completed{0}, too_early{0};
+      pool.run_phases(
+          chunks.size(), [&](std::size_t phase) { return chunks[phase]; },
+          [&](std::size_t phase, std::size_t chunk) {
+            if (completed.load() < before[phase]) ++too_early;
+            ++runs[before[phase] + chunk];
+            ++completed;
+          });
+      ASSERT_EQ(runs, std::vector<int>(all, 1));
+      ASSERT_EQ(too_early.load(), 0u);
+      std::vector<int> others(few(random));
+      pool.run(others.size(), [&](std::size_t i) { ++others[i]; });
+      ASSERT_EQ(others, std::vector<int>(others.size(), 1));
+    }
+  }
 }
 
 TEST(ThreadPool, RethrowsTheErrorOfTheLowestChunkAndGoesOn) {

@@ -83,13 +83,20 @@ TEST(RowTable, AlignsInnerCellsColorsFixedPartsAndTheOverflow) {
     }
     ASSERT_EQ(table.size() % kAlignment, 0u);
     ASSERT_LT(table.size() - end, kAlignment);
+    std::vector<int> rows(table.size());
+    for (std::size_t cell = 0; cell < sizes.size(); ++cell) {
+      for (std::uint32_t row = table.begin(cell); row < table.end(cell); ++row) ++rows[row];
+    }
+    table.for_gaps([&](std::uint32_t number) { ++rows[number]; });
+    ASSERT_EQ(rows, std::vector<int>(rows.size(), 1));
     for (std::size_t c = 0; c < shape.crossing_colors; ++c) {
       ASSERT_EQ(table.crossing_boundary(0, c), table.begin(table.crossing(0, c)));
       const std::uint32_t last = table.end(table.crossing(shape.parts - 1, c));
-      ASSERT_EQ(table.crossing_boundary(shape.parts, c), last);
-      for (std::size_t part = 1; part < shape.parts; ++part) {
-        const std::uint32_t boundary = table.crossing_boundary(part, c);
-        ASSERT_GE(boundary, table.crossing_boundary(part - 1, c));
+      const std::size_t slices = shape.parts * RowTable::kSlices;
+      ASSERT_EQ(table.crossing_boundary(slices, c), last);
+      for (std::size_t slice = 1; slice < slices; ++slice) {
+        const std::uint32_t boundary = table.crossing_boundary(slice, c);
+        ASSERT_GE(boundary, table.crossing_boundary(slice - 1, c));
         ASSERT_TRUE(boundary % kAlignment == 0 || boundary == last);
       }
     }

@@ -196,7 +196,7 @@ TEST(Allocation, AWorldTakesTheStatedMemory) {
   StepReport report;
   for (int n = 0; n < 150; ++n) report = world.step();
   ASSERT_GT(report.contacts, 2u * kSpheres);
-  EXPECT_LE((bytes - before) / kSpheres, static_cast<long>(322 * sizeof(Real) + 3));
+  EXPECT_LE((bytes - before) / kSpheres, static_cast<long>(325 * sizeof(Real)));
 }
 
 TEST(Allocation, TheCounterCounts) {

@@ -13,7 +13,7 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kMatchesPerChunk = 2048;
+constexpr std::size_t kMatchesPerChunk = 256;
 
 }  // namespace
 
@@ -31,10 +31,12 @@ void ContactCache::match(const MatchedBodies& bodies, bool any_rolls, const Join
   }
   resize_geometric(&now.colors, now.size());
   coloring_.start(bodies.inverse_mass.size(), pool);
-  parallel_for(pool, spheres, kMatchesPerChunk, [&](std::size_t first, std::size_t last) {
-    match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last), bodies);
-  });
-  parallel_for(pool, now.manifolds.size(), kMatchesPerChunk,
+  parallel_for(pool, spheres, chunk_size(spheres, 32, kMatchesPerChunk),
+               [&](std::size_t first, std::size_t last) {
+                 match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
+                               bodies);
+               });
+  parallel_for(pool, now.manifolds.size(), chunk_size(now.manifolds.size(), 32, kMatchesPerChunk),
                [&](std::size_t first, std::size_t last) {
                  match_manifolds(static_cast<std::uint32_t>(first),
                                  static_cast<std::uint32_t>(last), bodies);

@@ -47,7 +47,7 @@ std::size_t bin_of(Real radius) {
 }
 
 std::size_t queries_per_chunk(std::size_t queries) {
-  return std::max<std::size_t>(2048, (queries + 1023) / 1024);
+  return std::max<std::size_t>(256, (queries + 1023) / 1024);
 }
 
 /// Computes the rows around the cell of a query: all nine or, if `half`, only its own row and the
@@ -205,15 +205,14 @@ void CellSweep::fill_by_cell(const SphereSubset& subset, unsigned cell_bits, uns
   const std::uint64_t nowhere = to_unsigned(grid_.cells());  // greater than all cells
   Item* items = buffers->items.reserve(subset.count, "cells of spheres");
   Item* spare = buffers->spare.reserve(subset.count, "cells of spheres");
-  constexpr std::size_t kChunk = 2048;
-  pool.run((subset.count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(subset.count, (chunk + 1) * kChunk);
-    for (std::size_t i = chunk * kChunk; i < end; ++i) {
-      const std::int64_t cell = grid_.cell(subset[i].centre);
-      items[i] = pack(cell == CellGrid::kNowhere ? nowhere : to_unsigned(cell),
-                      static_cast<std::uint32_t>(i));
-    }
-  });
+  parallel_for(&pool, subset.count, chunk_size(subset.count, 128, 2048),
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t i = first; i < last; ++i) {
+                   const std::int64_t cell = grid_.cell(subset[i].centre);
+                   items[i] = pack(cell == CellGrid::kNowhere ? nowhere : to_unsigned(cell),
+                                   static_cast<std::uint32_t>(i));
+                 }
+               });
   items = sorter_.sort(pool, items, spare, subset.count, low_bit, cell_bits, key);
   const auto cell_of = [&](const Item& item) { return key(item) >> low_bit; };
   const Item* end = std::partition_point(

@@ -5,7 +5,7 @@
 #include <jfpx/shape.hpp>
 
 #include "src/base/buffer.hpp"
-#include "src/base/thread_pool.hpp"
+#include "src/base/parallel_for.hpp"
 #include "src/sphere_collider/cpu/kernels.hpp"
 
 #include <limits>
@@ -32,14 +32,13 @@ class SphereTable {
             const Id& id_of, const Cell& cell_of) {
     reserve(count + kMaxLanes);
     count_ = static_cast<std::uint32_t>(count);
-    constexpr std::size_t kChunk = 2048;
-    pool.run((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-      const std::size_t end = std::min(count, (chunk + 1) * kChunk);
-      for (std::size_t i = chunk * kChunk; i < end; ++i) {
-        const std::uint32_t id = id_of(i);
-        set(i, spheres[id], id, cell_of(i));
-      }
-    });
+    parallel_for(&pool, count, chunk_size(count, 128, 2048),
+                 [&](std::size_t first, std::size_t last) {
+                   for (std::size_t i = first; i < last; ++i) {
+                     const std::uint32_t id = id_of(i);
+                     set(i, spheres[id], id, cell_of(i));
+                   }
+                 });
     for (std::size_t i = count; i < count + kMaxLanes; ++i) set(i, {}, 0, kNoCell);
   }
 

@@ -97,7 +97,8 @@ SubShapeView SubShapeTable::view() {
 void SubShapeTable::update_poses(const BodyStore& store, ThreadPool* pool) {
   const SubShapeView all = view();
   const BodyView bodies = store.view_without_ids();
-  parallel_for(pool, ranges_.fixed_begin(), 1024, [&](std::size_t first, std::size_t last) {
+  const std::size_t count = ranges_.fixed_begin();
+  parallel_for(pool, count, chunk_size(count, 64, 1024), [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<SubShape>(first); i < last; ++i) all.update_pose(bodies, i);
   });
   for (const SubShape sub_shape : kinematic_) all.update_pose(bodies, sub_shape);

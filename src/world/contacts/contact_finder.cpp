@@ -8,6 +8,7 @@
 #include "src/world/contacts/merge_contacts.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace jfpx {
@@ -16,11 +17,11 @@ namespace {
 
 using soft_step::ContactSet;
 
-constexpr std::size_t kSubShapesPerChunk = 1024, kPairsPerChunk = NeighborPairs::kMostSelected;
-/// The test of a box takes as long as dozens of sphere tests.
-constexpr std::size_t kCandidatesPerChunk = 128;
+// A chunk takes about five microseconds.
+constexpr std::size_t kSubShapesPerChunk = 256, kPairsPerChunk = 256, kCandidatesPerChunk = 32;
+constexpr std::size_t kFewestItems = 32, kFewestCandidates = 8;
 /// Chunks of a batch for each thread: enough to balance their loads.
-constexpr std::size_t kChunksPerThread = 4;
+constexpr std::size_t kChunksPerThread = 16;
 
 /// A list that is refilled in every step. Its vector keeps the items of the last step until they
 /// are overwritten, because constructing items takes as long as filling them.
@@ -56,21 +57,55 @@ void sort_runs(std::vector<Candidate>* list, std::vector<Candidate>* scratch) {
   }
 }
 
-/// Appends the lists of all parts to a list.
-/// @param list returns the list of a part
-template <class Part, class List, class Item>
-void append(ThreadPool* pool, std::span<Part> parts, const List& list, Refilled<Item>* all) {
-  const std::size_t before = all->size;
-  std::size_t size = before;
-  for (Part& part : parts) size += list(part).size();
-  all->grow_to(size);
-  parallel_for(pool, parts.size(), kChunksPerThread, [&](std::size_t first, std::size_t last) {
-    std::size_t place = before;
-    for (std::size_t i = 0; i < first; ++i) place += list(parts[i]).size();
-    for (std::size_t i = first; i < last; ++i) {
-      std::ranges::copy(list(parts[i]), all->items->begin() + static_cast<std::ptrdiff_t>(place));
-      place += list(parts[i]).size();
+/// Sorts manifolds that are sorted unless bodies have contacts of both compounds and solids.
+void sort_by_key(ThreadPool* pool, std::vector<soft_step::ManifoldInput>* manifolds) {
+  const std::span<const soft_step::ManifoldInput> list(*manifolds);
+  const bool is_sorted = parallel_reduce(
+      pool, list.size(), chunk_size(list.size(), kFewestItems, kSubShapesPerChunk), true,
+      [&](std::size_t first, std::size_t last) {
+        for (std::size_t i = std::max<std::size_t>(first, 1); i < last; ++i) {
+          if (list[i].key < list[i - 1].key) return false;
+        }
+        return true;
+      },
+      std::logical_and<>());
+  if (is_sorted) return;
+  std::ranges::sort(*manifolds, {}, &soft_step::ManifoldInput::key);
+}
+
+/// A list of each part, and the list to which all of them are appended.
+template <class Part, class Item>
+struct Appended {
+  std::vector<Item> Part::*of_part;
+  Refilled<Item>* all;
+};
+template <class Part, class Item>
+Appended(std::vector<Item> Part::*, Refilled<Item>*) -> Appended<Part, Item>;
+
+/// Appends the lists of all parts, in the order of the parts.
+/// @param prepare is called for each part first, from any thread: Part::places are set
+template <class Part, class Prepare, class... Item>
+void append(ThreadPool* pool, std::span<Part> parts, const Prepare& prepare,
+            const Appended<Part, Item>&... lists) {
+  const auto place = [&](std::size_t k, const auto& list) {
+    std::size_t size = list.all->size;
+    for (Part& part : parts) {
+      part.places[k] = size;
+      size += (part.*list.of_part).size();
     }
+    list.all->grow_to(size);
+  };
+  const auto copy = [](const Part& part, std::size_t k, const auto& list) {
+    std::ranges::copy(part.*list.of_part,
+                      list.all->items->begin() + static_cast<std::ptrdiff_t>(part.places[k]));
+  };
+  std::size_t k = 0;
+  (place(k++, lists), ...);
+  // The thread that has filled a part has it in its cache.
+  parallel_for(pool, parts.size(), 1, [&](std::size_t i, std::size_t) {
+    prepare(&parts[i]);
+    std::size_t list = 0;
+    (copy(parts[i], list++, lists), ...);
   });
 }
 
@@ -132,12 +167,14 @@ void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPoo
   start_bounds(bodies, margin);
   if (fixed_changed_) std::ranges::fill(motion_, Vec3{});  // that of immovable bodies
   const std::span<const std::uint32_t> mobile = bodies.mobile();
-  parallel_for(pool, mobile.size(), kSubShapesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (const std::uint32_t i : mobile.subspan(first, last - first)) {
-      motion_[i] = swept_bounds_.bodies.predicted_motion(i);
-    }
-  });
-  parallel_for(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk,
+  parallel_for(pool, mobile.size(), chunk_size(mobile.size(), kFewestItems, kSubShapesPerChunk),
+               [&](std::size_t first, std::size_t last) {
+                 for (const std::uint32_t i : mobile.subspan(first, last - first)) {
+                   motion_[i] = swept_bounds_.bodies.predicted_motion(i);
+                 }
+               });
+  const std::size_t bounded = sub_shapes_.ranges().fixed_begin();
+  parallel_for(pool, bounded, chunk_size(bounded, kFewestItems, kSubShapesPerChunk),
                [&](std::size_t first, std::size_t last) {
                  for (auto i = static_cast<SubShape>(first); i < last; ++i) swept_bounds_.sweep(i);
                });
@@ -253,20 +290,18 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
       part->add(bodies, found);
     }
   };
-  for_each_batch(
-      pool, candidates.size(), kCandidatesPerChunk, test_chunk, [&](std::span<Part> parts) {
-        auto first_point = static_cast<std::uint32_t>(results->points.size);
-        for (Part& part : parts) {
-          for (soft_step::ManifoldInput& manifold : part.manifolds) manifold.first += first_point;
-          first_point += static_cast<std::uint32_t>(part.points.size());
-        }
-        append(
-            pool, parts, [](Part & p) -> auto& { return p.manifolds; }, &results->manifolds);
-        append(
-            pool, parts, [](Part & p) -> auto& { return p.points; }, &results->points);
-        append(
-            pool, parts, [](Part & p) -> auto& { return p.touches; }, &results->touches);
-      });
+  for_each_batch(pool, candidates.size(),
+                 chunk_size(candidates.size(), kFewestCandidates, kCandidatesPerChunk), test_chunk,
+                 [&](std::span<Part> parts) {
+                   const auto number_points = [](Part* part) {
+                     const auto first_point = static_cast<std::uint32_t>(part->places[0]);
+                     for (soft_step::ManifoldInput& manifold : part->manifolds)
+                       manifold.first += first_point;
+                   };
+                   append(pool, parts, number_points, Appended{&Part::points, &results->points},
+                          Appended{&Part::manifolds, &results->manifolds},
+                          Appended{&Part::touches, &results->touches});
+                 });
 }
 
 /// Removes the points that another contact of the same body a hides.
@@ -328,9 +363,11 @@ void ContactFinder::hide_points(std::size_t first, Results* results, ThreadPool*
     }
   };
   bool any = false;
-  for_each_batch(pool, manifolds.size(), kCandidatesPerChunk, find, [&](std::span<Part> parts) {
-    for (const Part& part : parts) any |= part.any_hidden;
-  });
+  for_each_batch(pool, manifolds.size(),
+                 chunk_size(manifolds.size(), kFewestCandidates, kCandidatesPerChunk), find,
+                 [&](std::span<Part> parts) {
+                   for (const Part& part : parts) any |= part.any_hidden;
+                 });
   if (!any) return;
   std::size_t kept = first;
   std::uint32_t kept_points = manifolds.front().first;
@@ -360,17 +397,15 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
       test_sphere_pairs(bodies, pairs, part);
     });
   };
-  for_each_batch(pool, found.pairs.size(), kPairsPerChunk, test_pairs, [&](std::span<Part> parts) {
-    for (const Part& part : parts) touching_spheres += part.touching_spheres;
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.spheres; }, &results.spheres);
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.touches; }, &results.touches);
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
-    append(
-        pool, parts, [](Part & p) -> auto& { return p.compounds; }, &compounds);
-  });
+  const auto nothing = [](Part*) {};
+  for_each_batch(
+      pool, found.pairs.size(), chunk_size(found.pairs.size(), kFewestItems, kPairsPerChunk),
+      test_pairs, [&](std::span<Part> parts) {
+        for (const Part& part : parts) touching_spheres += part.touching_spheres;
+        append(pool, parts, nothing, Appended{&Part::spheres, &results.spheres},
+               Appended{&Part::touches, &results.touches}, Appended{&Part::candidates, &candidates},
+               Appended{&Part::compounds, &compounds});
+      });
 
   compounds.finish();
   if (!compounds_.empty()) {
@@ -384,10 +419,10 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
   const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
     find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), &part->candidates);
   };
-  for_each_batch(pool, sub_shapes_.ranges().fixed_begin(), kSubShapesPerChunk, find_fixed,
+  const std::size_t count = sub_shapes_.ranges().fixed_begin();
+  for_each_batch(pool, count, chunk_size(count, kFewestItems, kSubShapesPerChunk), find_fixed,
                  [&](std::span<Part> parts) {
-                   append(
-                       pool, parts, [](Part & p) -> auto& { return p.candidates; }, &candidates);
+                   append(pool, parts, nothing, Appended{&Part::candidates, &candidates});
                  });
   candidates.finish();
   sort_runs(&candidates_, &merged_candidates_);
@@ -398,8 +433,7 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
   results.manifolds.finish();
   results.points.finish();
   results.touches.finish();
-  const auto by_key = [](const auto& x, const auto& y) { return x.key < y.key; };
-  if (!std::ranges::is_sorted(set->manifolds, by_key)) std::ranges::sort(set->manifolds, by_key);
+  sort_by_key(pool, &set->manifolds);
   return touching_spheres;
 }
 

@@ -65,7 +65,8 @@ class ContactFinder {
 
  private:
   /// Results of a chunk of a parallel loop.
-  struct Part {
+  /// Aligned, because threads change parts that are next to each other.
+  struct alignas(128) Part {
     std::vector<soft_step::SphereContactInput> spheres;
     std::vector<soft_step::ManifoldInput> manifolds;
     std::vector<soft_step::PointInput> points;
@@ -80,6 +81,7 @@ class ContactFinder {
     };
     std::vector<Surface> surfaces;
     bool any_hidden = false;
+    std::array<std::size_t, 4> places{};  ///< of its lists, where they are appended
     void add(const BodyStore& bodies, const CandidateManifold& found);
     void clear() {
       spheres.clear();

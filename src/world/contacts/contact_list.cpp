@@ -17,7 +17,7 @@ namespace {
 using soft_step::ContactKey;
 using soft_step::ContactView;
 
-constexpr std::size_t kContactsPerListChunk = 4096;
+constexpr std::size_t kContactsPerListChunk = 4096, kContactsPerCountChunk = 512;
 
 /// Appends the points of manifolds that began to touch during the step.
 void append_begun(const DetectedContacts& detected, const ContactView& contacts,
@@ -38,7 +38,7 @@ void append_begun(const DetectedContacts& detected, const ContactView& contacts,
 
 BegunCounts count_begun_contacts(const ContactView& contacts, ThreadPool* pool) {
   return parallel_reduce(
-      pool, contacts.size(), kContactsPerListChunk, BegunCounts(),
+      pool, contacts.size(), chunk_size(contacts.size(), 64, kContactsPerCountChunk), BegunCounts(),
       [&](std::size_t first, std::size_t last) {
         BegunCounts counts;
         for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {

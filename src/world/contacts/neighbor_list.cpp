@@ -14,7 +14,7 @@ namespace {
 
 /// Below this number of spheres, testing all pairs takes about the same time.
 constexpr std::size_t kFewest = 512;
-constexpr std::size_t kSpheresPerChunk = 4096;
+constexpr std::size_t kSpheresPerChunk = 1024;
 /// The slack is the motion of about kSearches searches, limited to fractions of the smallest
 /// radius. More slack means more pairs to test in every search (bench/results/soft_step.md).
 constexpr Real kSearches = 10, kLeast = Real(0.02), kMost = Real(0.15);
@@ -39,8 +39,9 @@ Real NeighborList::largest_motion(std::span<const SphereInstance> spheres, Threa
     }
     return largest;
   };
-  return slack_ +
-         parallel_reduce(pool, spheres.size(), kSpheresPerChunk, -slack_, largest_of, larger);
+  return slack_ + parallel_reduce(pool, spheres.size(),
+                                  chunk_size(spheres.size(), 128, kSpheresPerChunk), -slack_,
+                                  largest_of, larger);
 }
 
 /// @param motion [m], per search
@@ -50,8 +51,9 @@ Real NeighborList::choose_slack(std::span<const SphereInstance> spheres, Real mo
     return std::ranges::min(spheres.subspan(first, last - first), {}, &SphereInstance::radius)
         .radius;
   };
-  const Real smallest = parallel_reduce(pool, spheres.size(), kSpheresPerChunk, spheres[0].radius,
-                                        smallest_of, std::ranges::min);
+  const Real smallest =
+      parallel_reduce(pool, spheres.size(), chunk_size(spheres.size(), 128, kSpheresPerChunk),
+                      spheres[0].radius, smallest_of, std::ranges::min);
   const bool pays = kFewestSearches * motion <= kMost * smallest;
   if (!pays || !(smallest >= kLeastRadius)) return 0;
   return std::clamp(kSearches * motion, kLeast * smallest, kMost * smallest);
@@ -72,11 +74,12 @@ NeighborPairs NeighborList::find(std::span<const SphereInstance> spheres, Sphere
   }
   clear();
   bounds_.reserve(spheres.size(), "bounds of spheres");
-  parallel_for(pool, spheres.size(), kSpheresPerChunk, [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      bounds_[i] = {spheres[i].centre, spheres[i].radius + slack};
-    }
-  });
+  parallel_for(pool, spheres.size(), chunk_size(spheres.size(), 128, kSpheresPerChunk),
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t i = first; i < last; ++i) {
+                   bounds_[i] = {spheres[i].centre, spheres[i].radius + slack};
+                 }
+               });
   pairs_ = collider->find_pairs({bounds_.data(), spheres.size()});
   slack_ = slack;
   searches_ = 0;

@@ -27,8 +27,9 @@ using soft_step::ContactKey;
 using soft_step::ContactSet;
 using soft_step::ContactView;
 
-constexpr std::size_t kBodiesPerChunk = 128, kContactsPerChunk = 2048;
+constexpr std::size_t kContactsPerChunk = 1024;
 constexpr std::size_t kBodiesPerKernel = 64;
+constexpr std::size_t body_chunk(std::size_t bodies) { return chunk_size(bodies, 32, 128); }
 
 }  // namespace
 
@@ -105,7 +106,8 @@ soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
 void SoftStep::mark_constrained() {
   assign_geometric(&constrained_, bodies_.size(), 0);
   const ContactView contacts = cache_.current().view();
-  parallel_for(pool_, contacts.size(), kContactsPerChunk, [&](std::size_t first, std::size_t last) {
+  const std::size_t chunk = chunk_size(contacts.size(), 128, kContactsPerChunk);
+  parallel_for(pool_, contacts.size(), chunk, [&](std::size_t first, std::size_t last) {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       for (const std::uint32_t body : {contacts.key(i).a, contacts.key(i).b}) {
         std::atomic_ref(constrained_[body])
@@ -136,7 +138,7 @@ template <class Test>
 bool SoftStep::any_body(const BodyStore& store, const Test& test) {
   const std::span<const std::uint32_t> bodies = store.mobile();
   return parallel_reduce(
-      pool_, bodies.size(), kBodiesPerChunk, false,
+      pool_, bodies.size(), body_chunk(bodies.size()), false,
       [&](std::size_t first, std::size_t last) {
         bool any = false;
         for (const std::uint32_t i : bodies.subspan(first, last - first)) any |= test(i);
@@ -155,7 +157,7 @@ void SoftStep::load(const BodyStore& store) {
   });
   if (store.mobile().size() == store.size()) return;
   const std::span<const BodyId> ids = store.ids();
-  parallel_for(pool_, ids.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+  parallel_for(pool_, ids.size(), body_chunk(ids.size()), [&](std::size_t first, std::size_t last) {
     for (const BodyId id : ids.subspan(first, last - first)) {
       if (constrained_[id.index] != 0 && store.immovable(id.index)) step_.load(id.index);
     }
@@ -166,7 +168,7 @@ std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
   constexpr std::uint32_t kNone = BodyId{}.index;
   const std::span<const std::uint32_t> bodies = store.mobile();
   const std::uint32_t found = parallel_reduce(
-      pool_, bodies.size(), kBodiesPerChunk, kNone,
+      pool_, bodies.size(), body_chunk(bodies.size()), kNone,
       [&](std::size_t first, std::size_t last) {
         for (const std::uint32_t i : bodies.subspan(first, last - first)) {
           if (store.moving.awake[i] != 0 && !is_in_world(step_.state(i))) return i;
@@ -251,11 +253,12 @@ cpu::BodySweep SoftStep::body_sweep(bool is_first) {
 template <class Stage>
 void SoftStep::for_each_part(const BodyStore& store, const Stage& stage) {
   const std::span<const std::uint32_t> bodies = store.mobile();
-  parallel_for(pool_, bodies.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
-    for (; first < last; first += kBodiesPerKernel) {
-      stage(bodies.subspan(first, std::min(kBodiesPerKernel, last - first)));
-    }
-  });
+  parallel_for(pool_, bodies.size(), body_chunk(bodies.size()),
+               [&](std::size_t first, std::size_t last) {
+                 for (; first < last; first += kBodiesPerKernel) {
+                   stage(bodies.subspan(first, std::min(kBodiesPerKernel, last - first)));
+                 }
+               });
 }
 
 /// StepBodies::hold() for the kernels, which do not know locks.

@@ -30,14 +30,21 @@ class StartedLanes {
     Real counts[kLanes];
     for (unsigned k = 0; k < kLanes; ++k) {
       const std::size_t number = bundle * kBundle + k;
-      const bool is_row = setup.counts[number] != kNoManifold;
-      used_ |= is_row ? 1u << k : 0;
-      rows_[k] = static_cast<std::uint32_t>(is_row ? number : bundle * kBundle);
-      std::uint32_t numbers[4];
-      __builtin_memcpy(
-          numbers,
-          setup.rows + rows_[k] * manifold_row_offset::kStride + manifold_row_offset::kNumbers,
-          sizeof numbers);
+      std::uint32_t numbers[4];  // a, b, first point, number of points
+      const auto read = [&] {
+        __builtin_memcpy(
+            numbers,
+            setup.rows + rows_[k] * manifold_row_offset::kStride + manifold_row_offset::kNumbers,
+            sizeof numbers);
+      };
+      rows_[k] = static_cast<std::uint32_t>(number);
+      read();
+      if (numbers[3] > 0) {
+        used_ |= 1u << k;
+      } else {
+        rows_[k] = static_cast<std::uint32_t>(bundle * kBundle);
+        read();
+      }
       std::uint32_t is_jointed = 0;
       __builtin_memcpy(
           &is_jointed,

@@ -105,14 +105,11 @@ struct ManifoldSweep {
 using ManifoldSweepFunction = std::size_t (*)(const ManifoldSweep& sweep, std::size_t first,
                                               std::size_t last, std::uint32_t* left);
 
-/// Value of ManifoldSetup::counts of a number without a row. The first row of a bundle exists.
-inline constexpr std::uint8_t kNoManifold = 0xff;
-
-/// Rows that RowSetup::start_row() has started, and their bundles.
+/// Rows that RowSetup::start_row() has started, and their bundles. A number without a row has no
+/// points. The first row of a bundle exists.
 struct ManifoldSetup {
-  Real* rows;                  ///< ManifoldRow
-  Real* points;                ///< PointRow
-  const std::uint8_t* counts;  ///< points by row, or kNoManifold
+  Real* rows;    ///< ManifoldRow
+  Real* points;  ///< PointRow
   ManifoldBundles bundles;
   const Real* bodies;           ///< SolverBody, at the start of the step
   const Real* inverse_inertia;  ///< Mat3, by body, world axes

@@ -9,6 +9,7 @@
 #include "src/contact_solver/soft_step/row_operations.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <mutex>
 #include <numeric>
@@ -20,12 +21,20 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
-constexpr std::size_t kRowsPerChunk = 64, kContactsPerChunk = 4096;
+// Chunks take a few microseconds, so that small worlds have chunks for many threads.
+constexpr std::size_t kContactsPerChunk = 512;
 constexpr std::size_t kRowsPerKernel = 64;
-[[maybe_unused]] constexpr std::size_t kBundlesPerChunk = 128;
+constexpr std::size_t bundle_chunk(std::size_t bundles) { return chunk_size(bundles, 2, 8); }
 static_assert(kRowsPerKernel % cpu::kBundle == 0);
-// Of a world of one block.
-constexpr std::size_t kBodiesPerPart = 128;
+/// In a color, a chunk has rows with about this cost in all.
+constexpr std::size_t kCostPerChunk = 64;
+/// Of a row of spheres: 1.
+template <class Row>
+constexpr std::size_t kCost = 2;
+template <>
+constexpr std::size_t kCost<SphereRow> = 1;
+template <>
+constexpr std::size_t kCost<ManifoldRow> = 4;
 
 // The layout that sphere_sweep.hpp assumes.
 constexpr std::size_t kReal = sizeof(Real);
@@ -118,6 +127,12 @@ bool takes_part(Sweep sweep) {
   return !is_of_joints || kKindOf<Row> >= kContactRowKinds;
 }
 
+/// A number without a row.
+void mark_unused(ManifoldRow* row) { row->count = 0; }
+void mark_unused(FrameRow* row) { row->a = kWorld; }
+bool is_used(const ManifoldRow& row) { return row.count > 0; }
+bool is_used(const FrameRow& row) { return row.a != kWorld; }
+
 /// The function of kernels for a sweep.
 template <class Kernels>
 auto function_of(const Kernels& kernels, Sweep sweep) {
@@ -142,7 +157,7 @@ void SoftStepSolver::inspect_contacts() {
   const std::uint32_t count = setup_.size();
   resize_geometric(&kinds_, count);
   listed_.clear();
-  std::mutex mutex;
+  SpinLock mutex;
   struct Ends {
     std::uint32_t inner = 0, crossing = 0;
   };
@@ -171,12 +186,14 @@ void SoftStepSolver::inspect_contacts() {
     flush();
     return ends;
   };
-  const Ends ends = parallel_reduce(
-      pool_, count, kContactsPerChunk, Ends{}, inspect, [](const Ends& x, const Ends& y) {
-        return Ends{std::max(x.inner, y.inner), std::max(x.crossing, y.crossing)};
-      });
+  const Ends ends =
+      parallel_reduce(pool_, count, chunk_size(count, 128, kContactsPerChunk), Ends{}, inspect,
+                      [](const Ends& x, const Ends& y) {
+                        return Ends{std::max(x.inner, y.inner), std::max(x.crossing, y.crossing)};
+                      });
   const std::size_t parts =
-      has_blocks_ ? blocks_.size() : (bodies_.size() + kBodiesPerPart - 1) / kBodiesPerPart;
+      has_blocks_ ? blocks_.size()
+                  : (bodies_.size() + (std::size_t{1} << part_bits_) - 1) >> part_bits_;
   shape_ = {parts, has_blocks_ ? ends.inner : 0, ends.crossing, parts};
 }
 
@@ -214,7 +231,7 @@ void SoftStepSolver::list_joints() {
 
 /// The part of a movable body.
 std::uint32_t SoftStepSolver::part_of(std::uint32_t body) const {
-  return has_blocks_ ? blocks_.block(body) : body / static_cast<std::uint32_t>(kBodiesPerPart);
+  return has_blocks_ ? blocks_.block(body) : body >> part_bits_;
 }
 
 /// Divides the listed contacts into the overflow, and those with fixed bodies by part.
@@ -310,6 +327,13 @@ struct SoftStepSolver::Cursors {
   std::array<Kind, kRowKinds> kinds;
 };
 
+/// Chunk size of a loop over rows.
+template <class Row>
+std::size_t SoftStepSolver::row_chunk(std::size_t rows) {
+  if constexpr (kHasBundles<Row>) return cpu::kBundle * bundle_chunk(rows / cpu::kBundle);
+  return chunk_size(rows, 64, kContactsPerChunk);
+}
+
 /// Adds the row of a contact to a count.
 void SoftStepSolver::count(std::uint32_t contact, Place* place) const {
   ++place->row;
@@ -402,11 +426,9 @@ std::uint32_t SoftStepSolver::fill(RowKind kind, std::uint32_t contact, Place* p
       } else {
         setup_.fill<kFixed>(&row, all.parts_of(row), contact);
       }
-      manifold_counts_[number] = static_cast<std::uint8_t>(row.count);
       if (any_rebounds(row, all.parts_of(row))) any_rebound_.store(true, std::memory_order_relaxed);
     } else {
       setup_.fill<kFixed>(&row, all.parts_of(row), contact);
-      if constexpr (std::is_same_v<Row, FrameRow>) frame_used_[number] = 1;
     }
   });
   count(contact, place);
@@ -424,6 +446,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   has_blocks_ = has_blocks;
   is_packed_ = false;
   any_rebound_.store(false, std::memory_order_relaxed);
+  part_bits_ = static_cast<unsigned>(std::bit_width(chunk_size(bodies.size(), 32, 128)) - 1);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
   if (has_blocks) {
@@ -458,16 +481,16 @@ void SoftStepSolver::allocate_rows() {
       rows->part_table.scan();
       rows->parts.reserve_geometric(rows->part_table.size(), "points of contacts");
     }
+    if constexpr (kHasBundles<Row>) {
+      rows->table.for_gaps([&](std::uint32_t number) { mark_unused(&rows->rows[number]); });
+    }
   });
-  assign_geometric(&manifold_counts_, rows<ManifoldRow>().table.size(), cpu::kNoManifold);
-  assign_geometric(&frame_used_, rows<FrameRow>().table.size(), 0);
 }
 
 cpu::ManifoldSetup SoftStepSolver::manifold_setup() {
   Rows<ManifoldRow>& all = rows<ManifoldRow>();
   return {.rows = reinterpret_cast<Real*>(all.rows.data()),
           .points = reinterpret_cast<Real*>(all.parts.data()),
-          .counts = manifold_counts_.data(),
           .bundles = {bundle_numbers_.data(), bundle_rows_.data(), bundle_points_.data(),
                       first_point_.data()},
           .bodies = reinterpret_cast<const Real*>(bodies_.data()),
@@ -499,24 +522,25 @@ void SoftStepSolver::complete_manifolds() {
   const RowTable& table = rows<ManifoldRow>().table;
   const std::size_t bundles = table.size() / cpu::kBundle;
   resize_geometric(&first_point_, bundles + 1);
-  std::uint32_t points = 0;
-  for (std::size_t bundle = 0; bundle < bundles; ++bundle) {
-    first_point_[bundle] = points;
-    std::uint32_t most = 0;
-    for (std::size_t k = 0; k < cpu::kBundle; ++k) {
-      const std::uint8_t count = manifold_counts_[bundle * cpu::kBundle + k];
-      if (count != cpu::kNoManifold) most = std::max<std::uint32_t>(most, count);
+  const ManifoldRow* const all = rows<ManifoldRow>().rows.data();
+  parallel_for(pool_, bundles, bundle_chunk(bundles), [&](std::size_t first, std::size_t last) {
+    for (; first < last; ++first) {
+      std::uint32_t most = 0;
+      for (std::size_t k = 0; k < cpu::kBundle; ++k) {
+        most = std::max(most, all[first * cpu::kBundle + k].count);
+      }
+      first_point_[first] = most;
     }
-    points += most;
-  }
-  first_point_[bundles] = points;
+  });
+  first_point_[bundles] = 0;
+  std::exclusive_scan(first_point_.begin(), first_point_.end(), first_point_.begin(), 0u);
   constexpr const char* kWhat = "rows of contacts";
   bundle_numbers_.reserve_geometric(bundles, kWhat);
   bundle_rows_.reserve_geometric(bundles * (cpu::bundle_vector::kCount * cpu::kBundle), kWhat);
-  bundle_points_.reserve_geometric(std::size_t{points} * (cpu::bundle_point::kCount * cpu::kBundle),
-                                   kWhat);
+  bundle_points_.reserve_geometric(
+      std::size_t{first_point_[bundles]} * (cpu::bundle_point::kCount * cpu::kBundle), kWhat);
   const cpu::ManifoldSetup setup = manifold_setup();
-  parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
+  parallel_for(pool_, bundles, bundle_chunk(bundles), [&](std::size_t first, std::size_t last) {
     for_fixed_and_others(table, first, last,
                          [&](bool is_fixed, std::size_t begin, std::size_t end) {
                            cpu::kAvx2ManifoldSweep[is_fixed ? 1 : 0].complete(setup, begin, end);
@@ -526,16 +550,22 @@ void SoftStepSolver::complete_manifolds() {
 #endif
 }
 
-/// Writes the impulses of the bundles to the rows.
-void SoftStepSolver::unpack_manifolds() {
+/// Writes the impulses of bundles to the rows [first, last).
+/// @param first multiple of kBundle
+void SoftStepSolver::unpack([[maybe_unused]] Rows<ManifoldRow>* rows,
+                            [[maybe_unused]] std::size_t first, [[maybe_unused]] std::size_t last) {
 #if defined(__x86_64__)
   if (!is_packed_) return;
-  is_packed_ = false;
-  const cpu::ManifoldSetup setup = manifold_setup();
-  parallel_for(
-      pool_, rows<ManifoldRow>().table.size() / cpu::kBundle, kBundlesPerChunk,
-      [&](std::size_t first, std::size_t last) { cpu::kAvx2UnpackManifolds(setup, first, last); });
+  cpu::kAvx2UnpackManifolds(manifold_setup(), first / cpu::kBundle, last / cpu::kBundle);
 #endif
+}
+
+/// Writes the impulses of all bundles of manifolds to the rows.
+void SoftStepSolver::unpack_manifolds() {
+  Rows<ManifoldRow>& all = rows<ManifoldRow>();
+  parallel_for(pool_, all.table.size(), row_chunk<ManifoldRow>(all.table.size()),
+               [&](std::size_t first, std::size_t last) { unpack(&all, first, last); });
+  is_packed_ = false;
 }
 
 /// Writes a bundle of joints with frames.
@@ -543,8 +573,8 @@ void SoftStepSolver::pack_bundle(const cpu::FrameSweep& sweep, std::size_t bundl
   const std::size_t begin = bundle * cpu::kBundle;
   const auto for_lanes = [&](const auto& f) {
     for (std::size_t i = begin; i < begin + cpu::kBundle; ++i) {
-      const bool is_used = frame_used_[i] != 0;
-      f(frame_lane(sweep, i), rows<FrameRow>().rows[is_used ? i : begin], is_used);
+      const bool is_row = is_used(rows<FrameRow>().rows[i]);
+      f(frame_lane(sweep, i), rows<FrameRow>().rows[is_row ? i : begin], is_row);
     }
   };
   sweep.numbers[bundle] = {};
@@ -566,7 +596,7 @@ void SoftStepSolver::pack_frames() {
   frame_bundles_.reserve_geometric(bundles * (cpu::frame_vector::kCount * cpu::kBundle),
                                    "rows of joints");
   const cpu::FrameSweep sweep = frame_sweep();
-  parallel_for(pool_, bundles, kBundlesPerChunk, [&](std::size_t first, std::size_t last) {
+  parallel_for(pool_, bundles, bundle_chunk(bundles), [&](std::size_t first, std::size_t last) {
     for (std::size_t bundle = first; bundle < last; ++bundle) pack_bundle(sweep, bundle);
     for_fixed_and_others(all.table, first, last,
                          [&](bool is_fixed, std::size_t begin, std::size_t end) {
@@ -576,19 +606,15 @@ void SoftStepSolver::pack_frames() {
 #endif
 }
 
-/// Writes the impulses of the bundles to the rows.
-void SoftStepSolver::unpack_frames() {
+void SoftStepSolver::unpack([[maybe_unused]] Rows<FrameRow>* rows,
+                            [[maybe_unused]] std::size_t first, [[maybe_unused]] std::size_t last) {
 #if defined(__x86_64__)
   if (!uses_avx2_) return;
-  Rows<FrameRow>& all = rows<FrameRow>();
   const cpu::FrameSweep sweep = frame_sweep();
-  parallel_for(pool_, all.table.size(), kContactsPerChunk,
-               [&](std::size_t first, std::size_t last) {
-                 for (std::size_t i = first; i < last; ++i) {
-                   if (frame_used_[i] == 0 || !has_lane(all.rows[i].parameters)) continue;
-                   frame_lane(sweep, i).unpack_impulses(&all.rows[i]);
-                 }
-               });
+  for (std::size_t i = first; i < last; ++i) {
+    FrameRow& row = rows->rows[i];
+    if (is_used(row) && has_lane(row.parameters)) frame_lane(sweep, i).unpack_impulses(&row);
+  }
 #endif
 }
 
@@ -696,57 +722,58 @@ void SoftStepSolver::run_rows(Rows<Row>* rows, std::size_t first, std::size_t la
 }
 
 /// Solves the rows with the fixed bodies of a part: runs of the same rank and kind.
-void SoftStepSolver::sweep_fixed(std::size_t part, Sweep sweep) {
+template <class Operation>
+void SoftStepSolver::sweep_fixed(std::size_t part, Sweep sweep, const Operation& operation) {
   const std::span<const ListedContact> fixed = fixed_of(part);
-  with_operation(sweep, [&](const auto& operation) {
-    for (std::size_t first = 0, last = 0; first < fixed.size(); first = last) {
-      const ListedContact& run = fixed[first];
-      while (last < fixed.size() && fixed[last].rank == run.rank && fixed[last].kind == run.kind) {
-        ++last;
-      }
-      visit_row(run.kind, [&]<class Row>(std::type_identity<Row>) {
-        run_rows<true>(&rows<Row>(), run.row, run.row + (last - first), sweep, operation);
-      });
+  for (std::size_t first = 0, last = 0; first < fixed.size(); first = last) {
+    const ListedContact& run = fixed[first];
+    while (last < fixed.size() && fixed[last].rank == run.rank && fixed[last].kind == run.kind) {
+      ++last;
     }
-  });
+    visit_row(run.kind, [&]<class Row>(std::type_identity<Row>) {
+      run_rows<true>(&rows<Row>(), run.row, run.row + (last - first), sweep, operation);
+    });
+  }
 }
 
-void SoftStepSolver::sweep_inner(std::size_t block, Sweep sweep) {
-  with_operation(sweep, [&](const auto& operation) {
-    for (std::size_t color = 0; color < shape_.inner_colors; ++color) {
-      for_all_kinds([&](auto* rows) {
-        const std::size_t cell = rows->table.inner(block, color);
-        run_rows<false>(rows, rows->table.begin(cell), rows->table.end(cell), sweep, operation);
-      });
-    }
-  });
+template <class Operation>
+void SoftStepSolver::sweep_inner(std::size_t block, Sweep sweep, const Operation& operation) {
+  for (std::size_t color = 0; color < shape_.inner_colors; ++color) {
+    for_all_kinds([&](auto* rows) {
+      const std::size_t cell = rows->table.inner(block, color);
+      run_rows<false>(rows, rows->table.begin(cell), rows->table.end(cell), sweep, operation);
+    });
+  }
 }
 
-void SoftStepSolver::sweep_crossing(Sweep sweep) {
+/// The chunks of a crossing color. All colors are divided at the same parts, so that a thread has
+/// most of the bodies in its cache.
+SoftStepSolver::ColorChunks SoftStepSolver::chunks_of_color(std::size_t color, Sweep sweep) {
+  // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
   const std::size_t parts = shape_.parts;
-  with_operation(sweep, [&](const auto& operation) {
-    for (std::size_t color = 0; color < shape_.crossing_colors; ++color) {
-      // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
-      std::size_t count = 0;
-      for_all_kinds([&](auto* rows) {
-        using Row = std::remove_cvref_t<decltype(rows->rows[0])>;
-        if (!takes_part<Row>(sweep)) return;
-        const RowTable& table = rows->table;
-        count +=
-            table.end(table.crossing(parts - 1, color)) - table.begin(table.crossing(0, color));
-      });
-      if (count == 0) continue;
-      // All colors are divided at the same parts, so that a thread has most of the bodies in its
-      // cache.
-      const std::size_t chunk = std::max<std::size_t>(1, parts * kRowsPerChunk / (count + 1));
-      parallel_for(pool_, parts, chunk, [&](std::size_t first, std::size_t last) {
-        for_all_kinds([&](auto* rows) {
-          const RowTable& table = rows->table;
-          run_rows<false>(rows, table.crossing_boundary(first, color),
-                          table.crossing_boundary(last, color), sweep, operation);
-        });
-      });
-    }
+  std::size_t cost = 0;
+  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+    if (!takes_part<Row>(sweep)) return;
+    const RowTable& table = rows->table;
+    cost += kCost<Row> *
+            (table.end(table.crossing(parts - 1, color)) - table.begin(table.crossing(0, color)));
+  });
+  if (cost == 0) return {};
+  const std::size_t slices = parts * RowTable::kSlices;
+  const std::size_t size = std::max<std::size_t>(1, slices * kCostPerChunk / (cost + 1));
+  return {size, (slices + size - 1) / size};
+}
+
+template <class Operation>
+void SoftStepSolver::sweep_crossing(std::size_t color, std::size_t chunk, Sweep sweep,
+                                    const Operation& operation) {
+  const std::size_t slices = shape_.parts * RowTable::kSlices;
+  const std::size_t size = chunks_of_color(color, sweep).size;
+  const std::size_t first = chunk * size, last = std::min(slices, first + size);
+  for_all_kinds([&](auto* rows) {
+    const RowTable& table = rows->table;
+    run_rows<false>(rows, table.crossing_boundary(first, color),
+                    table.crossing_boundary(last, color), sweep, operation);
   });
 }
 
@@ -763,13 +790,24 @@ void SoftStepSolver::sweep_overflow(Sweep sweep) {
 void SoftStepSolver::sweep(Sweep sweep) {
   if (sweep == Sweep::restitution) unpack_manifolds();
   sweep_overflow(sweep);
-  if (shape_.inner_colors > 0) {
-    for_parts(shape_.parts, [&](std::size_t block) { sweep_inner(block, sweep); });
-  }
-  sweep_crossing(sweep);
-  if (!fixed_.empty()) {
-    for_parts(shape_.fixed_parts, [&](std::size_t part) { sweep_fixed(part, sweep); });
-  }
+  // The phases: inner rows, the crossing colors, rows with fixed bodies.
+  const std::size_t colors = shape_.crossing_colors;
+  const auto chunks_of = [&](std::size_t phase) {
+    if (phase == 0) return shape_.inner_colors > 0 ? shape_.parts : 0;
+    if (phase <= colors) return chunks_of_color(phase - 1, sweep).count;
+    return fixed_.empty() ? 0 : shape_.fixed_parts;
+  };
+  with_operation(sweep, [&](const auto& operation) {
+    pool_->run_phases(colors + 2, chunks_of, [&](std::size_t phase, std::size_t chunk) {
+      if (phase == 0) {
+        sweep_inner(chunk, sweep, operation);
+      } else if (phase <= colors) {
+        sweep_crossing(phase - 1, chunk, sweep, operation);
+      } else {
+        sweep_fixed(chunk, sweep, operation);
+      }
+    });
+  });
 }
 
 cpu::ManifoldSweep SoftStepSolver::manifold_sweep(bool is_fixed) {
@@ -808,19 +846,15 @@ cpu::FrameSweep SoftStepSolver::frame_sweep() {
 }
 
 void SoftStepSolver::store() {
-  unpack_manifolds();
-  unpack_frames();
   for_all_kinds([this]<class Row>(Rows<Row>* rows) {
-    parallel_for(pool_, rows->table.size(), kContactsPerChunk,
+    parallel_for(pool_, rows->table.size(), row_chunk<Row>(rows->table.size()),
                  [&](std::size_t first, std::size_t last) {
+                   if constexpr (kHasBundles<Row>) unpack(rows, first, last);
                    for (std::size_t i = first; i < last; ++i) {
-                     if constexpr (std::is_same_v<Row, ManifoldRow>) {
-                       if (manifold_counts_[i] == cpu::kNoManifold) continue;
-                     }
-                     if constexpr (std::is_same_v<Row, FrameRow>) {
-                       if (frame_used_[i] == 0) continue;
-                     }
                      const auto& row = rows->rows[i];
+                     if constexpr (kHasBundles<Row>) {
+                       if (!is_used(row)) continue;
+                     }
                      setup_.store(row, rows->parts_of(row), rows->contacts[i]);
                    }
                  });

@@ -189,21 +189,33 @@ class SoftStepSolver {
   template <bool kFixed, class Row, class Operation>
   void run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, Sweep sweep,
                 const Operation& operation);
-  void sweep_fixed(std::size_t part, Sweep sweep);
-  void sweep_inner(std::size_t block, Sweep sweep);
-  void sweep_crossing(Sweep sweep);
+  struct ColorChunks {
+    std::size_t size = 0;  ///< slices of a chunk, RowTable::kSlices
+    std::size_t count = 0;
+  };
+  template <class Operation>
+  void sweep_fixed(std::size_t part, Sweep sweep, const Operation& operation);
+  template <class Operation>
+  void sweep_inner(std::size_t block, Sweep sweep, const Operation& operation);
+  ColorChunks chunks_of_color(std::size_t color, Sweep sweep);
+  template <class Operation>
+  void sweep_crossing(std::size_t color, std::size_t chunk, Sweep sweep,
+                      const Operation& operation);
   void sweep_overflow(Sweep sweep);
   template <class F>
   static void for_fixed_and_others(const RowTable& table, std::size_t first, std::size_t last,
                                    const F& f);
   cpu::ManifoldSetup manifold_setup();
   void complete_manifolds();
+  template <class Row>
+  static std::size_t row_chunk(std::size_t rows);
+  void unpack(Rows<ManifoldRow>* rows, std::size_t first, std::size_t last);
   void unpack_manifolds();
   cpu::SphereSweep sphere_sweep();
   cpu::ManifoldSweep manifold_sweep(bool is_fixed);
   void pack_bundle(const cpu::FrameSweep& sweep, std::size_t bundle);
   void pack_frames();
-  void unpack_frames();
+  void unpack(Rows<FrameRow>* rows, std::size_t first, std::size_t last);
   cpu::FrameSweep frame_sweep();
 
   ThreadPool* pool_;
@@ -214,6 +226,7 @@ class SoftStepSolver {
   std::span<SolverBody> bodies_;
   BodyBlocks blocks_;
   bool has_blocks_ = false;
+  unsigned part_bits_ = 0;  ///< binary logarithm of the bodies of a part, in a world of one block
 
   std::vector<RowKind> kinds_;                                ///< by contact
   std::vector<std::uint32_t> first_sphere_, first_manifold_;  ///< by body a, and the end
@@ -226,13 +239,11 @@ class SoftStepSolver {
   std::atomic<bool> any_rebound_ = false;  ///< whether a restitution sweep has an effect
   RowsOfTypes<RowTypes>::type rows_;
   // Of rows of manifolds, if they are solved in vectors.
-  std::vector<std::uint8_t> manifold_counts_;  ///< see cpu::ManifoldSetup::counts
-  std::vector<std::uint32_t> first_point_;     ///< see cpu::ManifoldBundles
+  std::vector<std::uint32_t> first_point_;  ///< see cpu::ManifoldBundles
   Buffer<cpu::BundleNumbers> bundle_numbers_;
   Buffer<Real> bundle_rows_, bundle_points_;
   bool is_packed_ = false;  ///< whether the impulses of the rows are in the bundles
   // Of rows of joints with frames, likewise.
-  std::vector<std::uint8_t> frame_used_;  ///< by number: whether it has a row
   Buffer<cpu::FrameNumbers> frame_numbers_;
   Buffer<Real> frame_bundles_;
   // Body b of a joint with the world.
