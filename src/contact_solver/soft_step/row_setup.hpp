@@ -339,6 +339,13 @@ struct RowSetup {
         FramePose::of(*row, row->centres, properties.orientation[row->a], orientation_b));
   }
 
+  /// -1 if the row exchanges the bodies of the contact, otherwise 1.
+  JFPX_HD Real side_of(std::uint32_t contact) const {
+    return is_flipped(contacts.key(contact)) ? Real(-1) : Real(1);
+  }
+  JFPX_HD void store_rolling(const ManifoldRow& row, std::uint32_t contact) const {
+    contacts.rolling_impulses[contact] = row.rolling_impulse * side_of(contact);
+  }
   /// Writes the impulses of a row to its contact or joint. Does not read the bodies of the row.
   JFPX_HD void store(const SphereRow& row, const NoPart*, std::uint32_t contact) const {
     const Real side = side_of(contact);
@@ -349,9 +356,7 @@ struct RowSetup {
   }
   JFPX_HD void store(const ManifoldRow& row, const PointRow* points, std::uint32_t contact) const {
     const Real side = side_of(contact);
-    if (contacts.rolling_impulses != nullptr) {
-      contacts.rolling_impulses[contact] = row.rolling_impulse * side;
-    }
+    if (contacts.rolling_impulses != nullptr) store_rolling(row, contact);
     // The points share the friction. Their sum is that of the row, and so is their torque about the
     // normal if the points are in a plane with this normal. Points that nearly coincide have no
     // torque: their arms are rounding errors.
@@ -382,10 +387,6 @@ struct RowSetup {
   }
 
  private:
-  /// -1 if the row exchanges the bodies of the contact, otherwise 1.
-  JFPX_HD Real side_of(std::uint32_t contact) const {
-    return is_flipped(contacts.key(contact)) ? Real(-1) : Real(1);
-  }
   /// The inertias of the bodies of a joint at the start of the step.
   template <bool kFixed>
   JFPX_HD BodyPair joint_pair(const auto& row) const {

@@ -24,8 +24,8 @@ class StartedLanes {
       : setup_(setup),
         numbers_(setup.bundles.numbers + bundle),
         row_(setup.bundles.rows + bundle * (bundle_vector::kCount * kBundle)),
-        points_(setup.bundles.points +
-                setup.bundles.first_point[bundle] * (bundle_point::kCount * kBundle)),
+        first_of_bundle_(setup.bundles.first_point[bundle]),
+        points_(setup.bundles.points + first_of_bundle_ * (bundle_point::kCount * kBundle)),
         most_(setup.bundles.first_point[bundle + 1] - setup.bundles.first_point[bundle]) {
     Real counts[kLanes];
     for (unsigned k = 0; k < kLanes; ++k) {
@@ -99,13 +99,15 @@ class StartedLanes {
       centre_b = Vectors::select(has_point(i), centre_b + p.arm_b * p.share, centre_b);
     }
     Vectors friction{zero, zero, zero};
-    Vec twist_impulse = zero, twist_arm = zero;
+    Vec twist_impulse = zero, twist_arm = zero, spread = zero;
     for (unsigned i = 0; i < most_; ++i) {
       const Point& p = points[i];
       const Mask is_point = has_point(i);
       const Vectors arm = p.arm_a - centre_a;
       const Vec twist = Vectors::dot(Vectors::cross(arm, p.friction), normal);
-      const Vec length = S::square_root(Vectors::dot(arm, arm));
+      const Vec length2 = Vectors::dot(arm, arm), length = S::square_root(length2);
+      spread = S::select(is_point, spread + length2 * p.share, spread);
+      p.store_share(*this, i, arm);
       friction = Vectors::select(is_point, friction + p.friction, friction);
       twist_impulse = S::select(is_point, twist_impulse + twist, twist_impulse);
       twist_arm = S::select(is_point, twist_arm + length * p.share, twist_arm);
@@ -169,6 +171,8 @@ class StartedLanes {
     put(bundle_vector::kSlipMass, slip_mass);
     put(bundle_vector::kImpulses, impulses);
     put(bundle_vector::kPointCount, counts_);
+    const Vec least = S::set(setup_.epsilon) * Vectors::dot(centre_a, centre_a);
+    put(bundle_vector::kSpread, S::select(S::less(least, spread), spread, zero));
   }
 
   void unpack() const {
@@ -241,6 +245,14 @@ class StartedLanes {
       share =
           S::select(S::less(one, weight), one, S::select(S::less(least, weight), weight, least));
     }
+    /// @param arm from the centre of friction
+    void store_share(const StartedLanes& row, unsigned i, const Vectors& arm) const {
+      Real* const to =
+          row.setup_.bundles.shares + (row.first_of_bundle_ + i) * (bundle_share::kCount * kBundle);
+      const auto put = [to](std::size_t k, Vec v) { S::store(to + k * kBundle, v); };
+      put(bundle_share::kArm, arm.x), put(bundle_share::kArm + 1, arm.y);
+      put(bundle_share::kArm + 2, arm.z), put(bundle_share::kShare, share);
+    }
     void store(const StartedLanes& row, unsigned i, const Lever& lever, Vec mass) const {
       std::uint32_t numbers[kLanes];
       row.point_numbers(i, numbers);
@@ -294,6 +306,7 @@ class StartedLanes {
   const ManifoldSetup& setup_;
   BundleNumbers* numbers_;
   Real* row_;
+  std::size_t first_of_bundle_;  ///< point
   Real* points_;
   unsigned most_;  ///< largest number of points
   unsigned used_ = 0, is_jointed_ = 0;
@@ -305,6 +318,48 @@ class StartedLanes {
 template <class S, bool kFixed>
 void complete_manifolds(const ManifoldSetup& setup, std::size_t first, std::size_t last) {
   for (; first < last; ++first) StartedLanes<S, kFixed>(setup, first).complete();
+}
+/// RowSetup::store()
+template <class S>
+void keep_manifold(const ManifoldSetup& setup, std::size_t bundle, const KeptLanes& kept) {
+  using Vec = typename S::Vec;
+  using Vectors = Vec3Lanes<S>;
+  using namespace bundle_vector;
+  const BundleNumbers& numbers = setup.bundles.numbers[bundle];
+  const Real* const row = setup.bundles.rows + bundle * (bundle_vector::kCount * kBundle);
+  const auto vector = [row](std::size_t k) { return S::load(row + k * kBundle); };
+  const auto vectors = [&](std::size_t k) {
+    return Vectors{vector(k), vector(k + 1), vector(k + 2)};
+  };
+  const Vec zero = S::set(0), counts = vector(kPointCount), spread = vector(kSpread);
+  const Vectors normal = vectors(kNormal), impulses = vectors(kImpulses);
+  const Vectors friction = vectors(kTangent) * impulses.x + vectors(kBitangent) * impulses.y;
+  const Vec twist = S::select(S::less(zero, spread), impulses.z / spread, zero);
+  const Vec side = S::load(kept.side);
+  const std::size_t first = setup.bundles.first_point[bundle];
+  const std::size_t last = setup.bundles.first_point[bundle + 1];
+  for (std::size_t point = first; point < last; ++point) {
+    const Real* const values = setup.bundles.points + point * (bundle_point::kCount * kBundle);
+    const Real* const shared = setup.bundles.shares + point * (bundle_share::kCount * kBundle);
+    const auto share = [shared](std::size_t k) { return S::load(shared + k * kBundle); };
+    using namespace bundle_share;
+    const Vectors arm{share(kArm), share(kArm + 1), share(kArm + 2)};
+    const Vectors of_point = (friction + Vectors::cross(normal, arm) * twist) * share(kShare);
+    const Real* const normal_impulses = values + bundle_point::kImpulse * kBundle;
+    const Real* const rebounds = values + bundle_point::kRebound * kBundle;
+    unsigned released = 0;
+    std::uint32_t items[kBundle];
+    for (unsigned k = 0; k < kBundle; ++k) {
+      const bool has_pushed = !__builtin_signbit(rebounds[k]);
+      released |= !(normal_impulses[k] > 0) && has_pushed ? 1u << k : 0;
+      items[k] = kept.first[k] + static_cast<std::uint32_t>(point - first);
+    }
+    const Vec impulse =
+        S::select(S::mask_of(released), S::set(setup.released), S::load(normal_impulses));
+    const auto has_point = S::less(S::set(static_cast<Real>(point - first)), counts);
+    QuadLanes<S>{of_point * side, impulse}.store(
+        kept.impulses, 4, items, numbers.used & ~numbers.rolls & S::bits(has_point));
+  }
 }
 template <class S>
 void unpack_manifolds(const ManifoldSetup& setup, std::size_t first, std::size_t last) {

@@ -57,7 +57,9 @@ inline constexpr std::size_t kMasses = 42;  ///< xx, xy, yy
 inline constexpr std::size_t kSlipMass = 45;
 inline constexpr std::size_t kImpulses = 46;  ///< friction x, friction y, twist
 inline constexpr std::size_t kPointCount = 49;
-inline constexpr std::size_t kCount = 50;
+/// [m^2], mean square of the distances of the points from the centre of friction, or 0
+inline constexpr std::size_t kSpread = 50;
+inline constexpr std::size_t kCount = 51;
 }  // namespace bundle_vector
 
 /// Vectors of a point of each row of a bundle.
@@ -73,6 +75,13 @@ inline constexpr std::size_t kRebound = 15;
 inline constexpr std::size_t kCount = 16;
 }  // namespace bundle_point
 
+/// Vectors of a point of each row: how it shares the friction of the row.
+namespace bundle_share {
+inline constexpr std::size_t kArm = 0;  ///< from the centre of friction
+inline constexpr std::size_t kShare = 3;
+inline constexpr std::size_t kCount = 4;
+}  // namespace bundle_share
+
 /// Numbers of a bundle. The bodies of an unused lane are those of a used one.
 struct BundleNumbers {
   std::uint32_t a[kBundle], b[kBundle];  ///< bodies
@@ -86,6 +95,7 @@ struct ManifoldBundles {
   BundleNumbers* numbers;
   Real* rows;                        ///< bundle_vector::kCount vectors of each bundle
   Real* points;                      ///< bundle_point::kCount vectors of each point
+  Real* shares;                      ///< bundle_share::kCount vectors of each point
   const std::uint32_t* first_point;  ///< by bundle, and the end
 };
 
@@ -116,9 +126,22 @@ struct ManifoldSetup {
   Real inverse_friction_gap;    ///< of RowSetup
   Real least_weight;            ///< soft_step::kLeastWeight
   Real least_determinant;       ///< soft_step::kLeastDeterminant
+  Real epsilon;                 ///< kEpsilon
+  Real released;                ///< KeptImpulse::kReleased
 };
 /// Processes the bundles [first, last). A row has at least one point.
 using BundleFunction = void (*)(const ManifoldSetup& setup, std::size_t first, std::size_t last);
+
+/// Where the impulses of the rows of a bundle are kept.
+struct KeptLanes {
+  Real* impulses;                ///< KeptImpulse
+  std::uint32_t first[kBundle];  ///< by row: number of its first impulse
+  Real side[kBundle];            ///< by row: -1 if it exchanges the bodies of its contact, else 1
+};
+/// Keeps the impulses like RowSetup::store(), except those of rows with rolling or spinning
+/// friction.
+using KeepFunction = void (*)(const ManifoldSetup& setup, std::size_t bundle,
+                              const KeptLanes& kept);
 
 struct ManifoldSweepKernels {
   /// Completes the rows like RowSetup::fill(), and writes the bundles.
@@ -132,6 +155,7 @@ extern const ManifoldSweepKernels kAvx2ManifoldSweep[2];
 /// Writes the impulses of bundles to their rows, except those of rows with rolling or spinning
 /// friction, whose impulses are in the rows.
 extern const BundleFunction kAvx2UnpackManifolds;
+extern const KeepFunction kAvx2KeepManifold;
 
 }  // namespace cpu
 }  // namespace JFPX_ABI

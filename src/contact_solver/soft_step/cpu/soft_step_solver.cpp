@@ -226,7 +226,7 @@ void SoftStepSolver::list_joints() {
     if (kinds_[i] == kNoRow || !is_color(setup_.color_of(i))) continue;
     joints_.push_back({part_of(setup_.key(i).a), i});
   }
-  std::ranges::sort(joints_);
+  if (!std::ranges::is_sorted(joints_)) std::ranges::sort(joints_);
 }
 
 /// The part of a movable body.
@@ -492,12 +492,14 @@ cpu::ManifoldSetup SoftStepSolver::manifold_setup() {
   return {.rows = reinterpret_cast<Real*>(all.rows.data()),
           .points = reinterpret_cast<Real*>(all.parts.data()),
           .bundles = {bundle_numbers_.data(), bundle_rows_.data(), bundle_points_.data(),
-                      first_point_.data()},
+                      bundle_shares_.data(), first_point_.data()},
           .bodies = reinterpret_cast<const Real*>(bodies_.data()),
           .inverse_inertia = reinterpret_cast<const Real*>(setup_.properties.inverse_inertia),
           .inverse_friction_gap = setup_.inverse_friction_gap,
           .least_weight = kLeastWeight,
-          .least_determinant = kLeastDeterminant};
+          .least_determinant = kLeastDeterminant,
+          .epsilon = kEpsilon,
+          .released = KeptImpulse::kReleased};
 }
 
 /// Calls f(is_fixed, first, last) for parts of the bundles [first, last): those of rows with and
@@ -539,6 +541,8 @@ void SoftStepSolver::complete_manifolds() {
   bundle_rows_.reserve_geometric(bundles * (cpu::bundle_vector::kCount * cpu::kBundle), kWhat);
   bundle_points_.reserve_geometric(
       std::size_t{first_point_[bundles]} * (cpu::bundle_point::kCount * cpu::kBundle), kWhat);
+  bundle_shares_.reserve_geometric(
+      std::size_t{first_point_[bundles]} * (cpu::bundle_share::kCount * cpu::kBundle), kWhat);
   const cpu::ManifoldSetup setup = manifold_setup();
   parallel_for(pool_, bundles, bundle_chunk(bundles), [&](std::size_t first, std::size_t last) {
     for_fixed_and_others(table, first, last,
@@ -845,19 +849,56 @@ cpu::FrameSweep SoftStepSolver::frame_sweep() {
           .starts = false};
 }
 
+/// Keeps the impulses of the rows of a bundle.
+void SoftStepSolver::keep_bundle([[maybe_unused]] std::size_t bundle) {
+#if defined(__x86_64__)
+  const Rows<ManifoldRow>& all = rows<ManifoldRow>();
+  const ContactView& contacts = setup_.contacts;
+  const cpu::BundleNumbers& numbers = bundle_numbers_[bundle];
+  cpu::KeptLanes kept{reinterpret_cast<Real*>(contacts.impulses), {}, {}};
+  for (unsigned k = 0; k < cpu::kBundle; ++k) {
+    if ((numbers.used >> k & 1) == 0) continue;
+    const std::size_t row = bundle * cpu::kBundle + k;
+    const std::uint32_t contact = all.contacts[row];
+    if ((numbers.rolls >> k & 1) != 0) {
+      setup_.store(all.rows[row], &all.parts[all.rows[row].first], contact);
+      continue;
+    }
+    kept.first[k] = contacts.first_impulse(contact);
+    kept.side[k] = setup_.side_of(contact);
+    if (contacts.rolling_impulses != nullptr) setup_.store_rolling(all.rows[row], contact);
+  }
+  cpu::kAvx2KeepManifold(manifold_setup(), bundle, kept);
+#endif
+}
+
+void SoftStepSolver::store(Rows<ManifoldRow>* rows, std::size_t first, std::size_t last) {
+  if (is_packed_) {
+    for (; first < last; first += cpu::kBundle) keep_bundle(first / cpu::kBundle);
+    return;
+  }
+  for (; first < last; ++first) {
+    const ManifoldRow& row = rows->rows[first];
+    if (is_used(row)) setup_.store(row, rows->parts_of(row), rows->contacts[first]);
+  }
+}
+void SoftStepSolver::store(Rows<FrameRow>* rows, std::size_t first, std::size_t last) {
+  unpack(rows, first, last);
+  for (; first < last; ++first) {
+    const FrameRow& row = rows->rows[first];
+    if (is_used(row)) setup_.store(row, nullptr, rows->contacts[first]);
+  }
+}
+template <class Row>
+void SoftStepSolver::store(Rows<Row>* rows, std::size_t first, std::size_t last) {
+  for (; first < last; ++first) setup_.store(rows->rows[first], nullptr, rows->contacts[first]);
+}
+
 void SoftStepSolver::store() {
   for_all_kinds([this]<class Row>(Rows<Row>* rows) {
-    parallel_for(pool_, rows->table.size(), row_chunk<Row>(rows->table.size()),
-                 [&](std::size_t first, std::size_t last) {
-                   if constexpr (kHasBundles<Row>) unpack(rows, first, last);
-                   for (std::size_t i = first; i < last; ++i) {
-                     const auto& row = rows->rows[i];
-                     if constexpr (kHasBundles<Row>) {
-                       if (!is_used(row)) continue;
-                     }
-                     setup_.store(row, rows->parts_of(row), rows->contacts[i]);
-                   }
-                 });
+    const std::size_t count = rows->table.size();
+    parallel_for(pool_, count, row_chunk<Row>(count),
+                 [&](std::size_t first, std::size_t last) { store(rows, first, last); });
   });
 }
 

@@ -211,6 +211,11 @@ class SoftStepSolver {
   static std::size_t row_chunk(std::size_t rows);
   void unpack(Rows<ManifoldRow>* rows, std::size_t first, std::size_t last);
   void unpack_manifolds();
+  void keep_bundle(std::size_t bundle);
+  void store(Rows<ManifoldRow>* rows, std::size_t first, std::size_t last);
+  void store(Rows<FrameRow>* rows, std::size_t first, std::size_t last);
+  template <class Row>
+  void store(Rows<Row>* rows, std::size_t first, std::size_t last);
   cpu::SphereSweep sphere_sweep();
   cpu::ManifoldSweep manifold_sweep(bool is_fixed);
   void pack_bundle(const cpu::FrameSweep& sweep, std::size_t bundle);
@@ -241,7 +246,7 @@ class SoftStepSolver {
   // Of rows of manifolds, if they are solved in vectors.
   std::vector<std::uint32_t> first_point_;  ///< see cpu::ManifoldBundles
   Buffer<cpu::BundleNumbers> bundle_numbers_;
-  Buffer<Real> bundle_rows_, bundle_points_;
+  Buffer<Real> bundle_rows_, bundle_points_, bundle_shares_;
   bool is_packed_ = false;  ///< whether the impulses of the rows are in the bundles
   // Of rows of joints with frames, likewise.
   Buffer<cpu::FrameNumbers> frame_numbers_;

@@ -77,6 +77,7 @@ constinit const SphereSweepKernels kAvx2SphereSweep = {warm_start<Avx2>,
 constinit const FrameSweepKernels kAvx2FrameSweep[2] = {frame_kernels<Avx2, false>(),
                                                         frame_kernels<Avx2, true>()};
 constinit const BundleFunction kAvx2UnpackManifolds = unpack_manifolds<Avx2>;
+constinit const KeepFunction kAvx2KeepManifold = keep_manifold<Avx2>;
 constinit const ManifoldSweepKernels kAvx2ManifoldSweep[2] = {
     {complete_manifolds<Avx2, false>,
      warm_start_manifolds<Avx2, false>,
