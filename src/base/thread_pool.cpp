@@ -50,13 +50,11 @@ constexpr std::uint64_t count_of(std::uint64_t value) { return value & kCount; }
 /// A thread takes this fraction of the remaining chunks, up to a limit: a descheduled thread delays
 /// the loop by its portion.
 constexpr std::uint64_t kPortionDivisor = 4, kLargestPortion = 8;
-/// Up to this number of chunks a thread, workers run their own chunks only: looking at the chunks
-/// of others takes longer than a short loop. The caller takes those that are left.
+/// Up to this number of chunks a thread, a thread that has run its own chunks waits for some polls
+/// before it takes those of others: looking at them takes longer than a short loop.
 constexpr std::uint64_t kFewChunks = 2;
-/// Polls before the caller does so.
-constexpr unsigned kPollsBeforeHelp = 16;
-/// Polls before a thread that waits for the end of a phase does so.
-constexpr unsigned kPollsOfPhase = 64;
+/// Polls of the caller; polls of a worker, and of a thread that waits for the end of a phase.
+constexpr unsigned kPollsOfCaller = 16, kPollsBeforeHelp = 64;
 /// Count of chunks of a job with phases.
 constexpr std::uint64_t kHasPhases = kCount;
 
@@ -287,7 +285,7 @@ void ThreadPool::Workers::run_job(const Job& job) {
   // Does not wait for workers without a chunk: on a loaded machine that would take longer than the
   // loop.
   for (unsigned i = 0; !is_complete(published); ++i) {
-    if (!has_helped && (!is_short(published) || i >= std::min(polls_, kPollsBeforeHelp))) {
+    if (!has_helped && (!is_short(published) || i >= std::min(polls_, kPollsOfCaller))) {
       take_chunks_of_others(0, published, &done);
       has_helped = true;
       continue;
@@ -335,7 +333,7 @@ void ThreadPool::Workers::take_phases(unsigned self, std::uint64_t number) {
     take_chunks_of(self, self, job, &done);
     for (unsigned i = 0; !has_ended(job); ++i) {
       // A worker that has not joined has left its chunks.
-      if (i == std::min(polls_, kPollsOfPhase)) take_chunks_of_others(self, job, &done);
+      if (i == std::min(polls_, kPollsBeforeHelp)) take_chunks_of_others(self, job, &done);
       i < polls_ ? pause() : std::this_thread::yield();
     }
   }
@@ -409,7 +407,11 @@ bool ThreadPool::Workers::has_ended(std::uint64_t phase) const {
 /// @param job number and chunks
 void ThreadPool::Workers::take_chunks(unsigned self, std::uint64_t job) {
   std::uint64_t done = 0;
-  if (!take_chunks_of(self, self, job, &done) || is_short(job)) return;
+  if (!take_chunks_of(self, self, job, &done)) return;
+  for (unsigned i = 0; is_short(job) && i < std::min(polls_, kPollsBeforeHelp); ++i) {
+    if (number_of(published_.load(std::memory_order_relaxed)) != number_of(job)) return;
+    pause();
+  }
   take_chunks_of_others(self, job, &done);
 }
 

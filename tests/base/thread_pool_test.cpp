@@ -66,6 +66,19 @@ TEST(ThreadPool, ManyShortLoopsInARow) {
   EXPECT_EQ(sums, std::vector<std::size_t>(3, 2000 * 1999 / 2));
 }
 
+/// Chunk 3 belongs to the thread that runs chunk 2, and the caller begins with chunk 0.
+TEST(ThreadPool, WorkersTakeTheChunksOfBusyThreads) {
+  ThreadPool pool(3);
+  for (int round = 0; round < 20; ++round) {
+    std::atomic<bool> is_run{false};
+    pool.run(6, [&](std::size_t i) {
+      if (i == 3) is_run = true;
+      while (i % 2 == 0 && i < 4 && !is_run) std::this_thread::yield();
+    });
+    EXPECT_TRUE(is_run);
+  }
+}
+
 /// A chunk begins after all chunks of the phases before it.
 TEST(ThreadPool, RunsPhasesOneAfterTheOther) {
   const test::Seed seed;
