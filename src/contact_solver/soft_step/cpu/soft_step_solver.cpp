@@ -768,11 +768,11 @@ SoftStepSolver::ColorChunks SoftStepSolver::chunks_of_color(std::size_t color, S
   return {size, (slices + size - 1) / size};
 }
 
+/// @param size slices of a chunk
 template <class Operation>
-void SoftStepSolver::sweep_crossing(std::size_t color, std::size_t chunk, Sweep sweep,
-                                    const Operation& operation) {
+void SoftStepSolver::sweep_crossing(std::size_t color, std::size_t chunk, std::size_t size,
+                                    Sweep sweep, const Operation& operation) {
   const std::size_t slices = shape_.parts * RowTable::kSlices;
-  const std::size_t size = chunks_of_color(color, sweep).size;
   const std::size_t first = chunk * size, last = std::min(slices, first + size);
   for_all_kinds([&](auto* rows) {
     const RowTable& table = rows->table;
@@ -796,9 +796,13 @@ void SoftStepSolver::sweep(Sweep sweep) {
   sweep_overflow(sweep);
   // The phases: inner rows, the crossing colors, rows with fixed bodies.
   const std::size_t colors = shape_.crossing_colors;
+  std::array<ColorChunks, kColorsPerClass> of_color;
+  for (std::size_t color = 0; color < colors; ++color) {
+    of_color[color] = chunks_of_color(color, sweep);
+  }
   const auto chunks_of = [&](std::size_t phase) {
     if (phase == 0) return shape_.inner_colors > 0 ? shape_.parts : 0;
-    if (phase <= colors) return chunks_of_color(phase - 1, sweep).count;
+    if (phase <= colors) return of_color[phase - 1].count;
     return fixed_.empty() ? 0 : shape_.fixed_parts;
   };
   with_operation(sweep, [&](const auto& operation) {
@@ -806,7 +810,7 @@ void SoftStepSolver::sweep(Sweep sweep) {
       if (phase == 0) {
         sweep_inner(chunk, sweep, operation);
       } else if (phase <= colors) {
-        sweep_crossing(phase - 1, chunk, sweep, operation);
+        sweep_crossing(phase - 1, chunk, of_color[phase - 1].size, sweep, operation);
       } else {
         sweep_fixed(chunk, sweep, operation);
       }

@@ -199,7 +199,7 @@ class SoftStepSolver {
   void sweep_inner(std::size_t block, Sweep sweep, const Operation& operation);
   ColorChunks chunks_of_color(std::size_t color, Sweep sweep);
   template <class Operation>
-  void sweep_crossing(std::size_t color, std::size_t chunk, Sweep sweep,
+  void sweep_crossing(std::size_t color, std::size_t chunk, std::size_t size, Sweep sweep,
                       const Operation& operation);
   void sweep_overflow(Sweep sweep);
   template <class F>
