@@ -26,8 +26,8 @@ constexpr std::size_t kContactsPerChunk = 512;
 constexpr std::size_t kRowsPerKernel = 64;
 constexpr std::size_t bundle_chunk(std::size_t bundles) { return chunk_size(bundles, 2, 8); }
 static_assert(kRowsPerKernel % cpu::kBundle == 0);
-/// In a color, a chunk has rows with about this cost in all.
-constexpr std::size_t kCostPerChunk = 64;
+/// Of a chunk of a color; of a color that one thread solves alone.
+constexpr std::size_t kCostPerChunk = 64, kCostOfOneThread = 128;
 /// Of a row of spheres: 1.
 template <class Row>
 constexpr std::size_t kCost = 2;
@@ -446,6 +446,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   has_blocks_ = has_blocks;
   is_packed_ = false;
   any_rebound_.store(false, std::memory_order_relaxed);
+  phases_.reserve(kColorsPerClass + 2);
   part_bits_ = static_cast<unsigned>(std::bit_width(chunk_size(bodies.size(), 32, 128)) - 1);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
@@ -750,35 +751,52 @@ void SoftStepSolver::sweep_inner(std::size_t block, Sweep sweep, const Operation
   }
 }
 
-/// The chunks of a crossing color. All colors are divided at the same parts, so that a thread has
-/// most of the bodies in its cache.
-SoftStepSolver::ColorChunks SoftStepSolver::chunks_of_color(std::size_t color, Sweep sweep) {
-  // One loop over the rows of all kinds: ending a loop costs as much as dozens of rows.
-  const std::size_t parts = shape_.parts;
+/// Number of chunks of a crossing color.
+std::size_t SoftStepSolver::chunks_of_color(std::size_t color, Sweep sweep) const {
   std::size_t cost = 0;
-  for_all_kinds([&]<class Row>(Rows<Row>* rows) {
+  for_all_kinds([&]<class Row>(const Rows<Row>* rows) {
     if (!takes_part<Row>(sweep)) return;
     const RowTable& table = rows->table;
-    cost += kCost<Row> *
-            (table.end(table.crossing(parts - 1, color)) - table.begin(table.crossing(0, color)));
+    cost += kCost<Row> * (table.end(table.crossing(shape_.parts - 1, color)) -
+                          table.begin(table.crossing(0, color)));
   });
-  if (cost == 0) return {};
-  const std::size_t slices = parts * RowTable::kSlices;
-  const std::size_t size = std::max<std::size_t>(1, slices * kCostPerChunk / (cost + 1));
-  return {size, (slices + size - 1) / size};
+  if (cost == 0) return 0;
+  const std::size_t chunks =
+      cost <= kCostOfOneThread ? 1 : (cost + kCostPerChunk - 1) / kCostPerChunk;
+  return std::min(chunks, shape_.parts * RowTable::kSlices);
 }
 
-/// @param size slices of a chunk
+/// Solves a chunk of a crossing color. All colors are divided at the same parts, so that a thread
+/// has most of the bodies in its cache.
 template <class Operation>
-void SoftStepSolver::sweep_crossing(std::size_t color, std::size_t chunk, std::size_t size,
+void SoftStepSolver::sweep_crossing(std::size_t color, std::size_t chunk, std::size_t chunks,
                                     Sweep sweep, const Operation& operation) {
   const std::size_t slices = shape_.parts * RowTable::kSlices;
-  const std::size_t first = chunk * size, last = std::min(slices, first + size);
+  const std::size_t first = slices * chunk / chunks, last = slices * (chunk + 1) / chunks;
   for_all_kinds([&](auto* rows) {
     const RowTable& table = rows->table;
     run_rows<false>(rows, table.crossing_boundary(first, color),
                     table.crossing_boundary(last, color), sweep, operation);
   });
+}
+
+/// Consecutive colors with one chunk each are one phase of one thread: a phase takes as long as
+/// dozens of rows.
+void SoftStepSolver::find_phases(Sweep sweep) {
+  phases_.clear();
+  if (shape_.inner_colors > 0) phases_.push_back({Phase::inner, 0, 0, shape_.parts});
+  for (std::size_t color = 0; color < shape_.crossing_colors; ++color) {
+    const std::size_t chunks = chunks_of_color(color, sweep);
+    if (chunks == 0) continue;
+    const bool joins = chunks == 1 && !phases_.empty() && phases_.back().kind == Phase::crossing &&
+                       phases_.back().chunks == 1;
+    if (joins) {
+      phases_.back().last_color = color;
+    } else {
+      phases_.push_back({Phase::crossing, color, color, chunks});
+    }
+  }
+  if (!fixed_.empty()) phases_.push_back({Phase::fixed, 0, 0, shape_.fixed_parts});
 }
 
 void SoftStepSolver::sweep_overflow(Sweep sweep) {
@@ -794,27 +812,24 @@ void SoftStepSolver::sweep_overflow(Sweep sweep) {
 void SoftStepSolver::sweep(Sweep sweep) {
   if (sweep == Sweep::restitution) unpack_manifolds();
   sweep_overflow(sweep);
-  // The phases: inner rows, the crossing colors, rows with fixed bodies.
-  const std::size_t colors = shape_.crossing_colors;
-  std::array<ColorChunks, kColorsPerClass> of_color;
-  for (std::size_t color = 0; color < colors; ++color) {
-    of_color[color] = chunks_of_color(color, sweep);
-  }
-  const auto chunks_of = [&](std::size_t phase) {
-    if (phase == 0) return shape_.inner_colors > 0 ? shape_.parts : 0;
-    if (phase <= colors) return of_color[phase - 1].count;
-    return fixed_.empty() ? 0 : shape_.fixed_parts;
-  };
+  find_phases(sweep);
   with_operation(sweep, [&](const auto& operation) {
-    pool_->run_phases(colors + 2, chunks_of, [&](std::size_t phase, std::size_t chunk) {
-      if (phase == 0) {
-        sweep_inner(chunk, sweep, operation);
-      } else if (phase <= colors) {
-        sweep_crossing(phase - 1, chunk, of_color[phase - 1].size, sweep, operation);
-      } else {
-        sweep_fixed(chunk, sweep, operation);
+    const auto run = [&](std::size_t number, std::size_t chunk) {
+      const Phase& phase = phases_[number];
+      switch (phase.kind) {
+        case Phase::inner:
+          return sweep_inner(chunk, sweep, operation);
+        case Phase::crossing:
+          for (std::size_t color = phase.first_color; color <= phase.last_color; ++color) {
+            sweep_crossing(color, chunk, phase.chunks, sweep, operation);
+          }
+          return;
+        case Phase::fixed:
+          return sweep_fixed(chunk, sweep, operation);
       }
-    });
+    };
+    pool_->run_phases(
+        phases_.size(), [this](std::size_t number) { return phases_[number].chunks; }, run);
   });
 }
 

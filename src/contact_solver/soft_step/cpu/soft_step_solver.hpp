@@ -151,6 +151,10 @@ class SoftStepSolver {
   void for_all_kinds(const F& f) {
     std::apply([&f](auto&... rows) { (f(&rows), ...); }, rows_);
   }
+  template <class F>
+  void for_all_kinds(const F& f) const {
+    std::apply([&f](const auto&... rows) { (f(&rows), ...); }, rows_);
+  }
 
   void inspect_contacts();
   template <class Contact>
@@ -189,18 +193,21 @@ class SoftStepSolver {
   template <bool kFixed, class Row, class Operation>
   void run_rows(Rows<Row>* rows, std::size_t first, std::size_t last, Sweep sweep,
                 const Operation& operation);
-  struct ColorChunks {
-    std::size_t size = 0;  ///< slices of a chunk, RowTable::kSlices
-    std::size_t count = 0;
+  /// Rows that are independent of each other, or that one thread solves.
+  struct Phase {
+    enum Kind : std::uint8_t { inner, crossing, fixed } kind;
+    std::size_t first_color, last_color;  ///< of crossing rows
+    std::size_t chunks;
   };
   template <class Operation>
   void sweep_fixed(std::size_t part, Sweep sweep, const Operation& operation);
   template <class Operation>
   void sweep_inner(std::size_t block, Sweep sweep, const Operation& operation);
-  ColorChunks chunks_of_color(std::size_t color, Sweep sweep);
+  std::size_t chunks_of_color(std::size_t color, Sweep sweep) const;
   template <class Operation>
-  void sweep_crossing(std::size_t color, std::size_t chunk, std::size_t size, Sweep sweep,
+  void sweep_crossing(std::size_t color, std::size_t chunk, std::size_t chunks, Sweep sweep,
                       const Operation& operation);
+  void find_phases(Sweep sweep);
   void sweep_overflow(Sweep sweep);
   template <class F>
   static void for_fixed_and_others(const RowTable& table, std::size_t first, std::size_t last,
@@ -241,6 +248,7 @@ class SoftStepSolver {
   std::vector<ListedContact> overflow_;     ///< sorted by (kind, contact)
   std::vector<ListedContact> listed_;       ///< unsorted
   RowTable::Shape shape_;
+  std::vector<Phase> phases_;              ///< of a sweep
   std::atomic<bool> any_rebound_ = false;  ///< whether a restitution sweep has an effect
   RowsOfTypes<RowTypes>::type rows_;
   // Of rows of manifolds, if they are solved in vectors.
