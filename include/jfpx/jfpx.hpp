@@ -3,6 +3,7 @@
 
 #include <jfpx/backend.hpp>
 #include <jfpx/build.hpp>
+#include <jfpx/character.hpp>
 #include <jfpx/collide.hpp>
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/contact_list.hpp>

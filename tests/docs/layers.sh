@@ -40,7 +40,7 @@ while IFS=: read -r file target; do
   [ -z "$own" ] || [ "$own" = "$other" ] || { echo "$file includes src/$target, another backend"; status=1; }
 done < <(grep -rHoE '^ *#include "src/[^"]+' src | sed 's/ *#include "src\///')
 # Folders of src/world, the lowest first. A folder may include those before it, and no file of src/world itself.
-world_folders=(bodies contacts joints forces queries step device cuda snapshots recording)
+world_folders=(bodies contacts joints forces queries character step device cuda snapshots recording)
 while IFS=: read -r file target; do
   from=${file#src/world/} to=${target#world/}
   case "$from" in */*) from=${from%%/*} ;; *) continue ;; esac

@@ -57,6 +57,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/snapshot_test.cpp
   world/vector_width_test.cpp
   world/world_test.cpp)
+jfpx_add_test(character_test SOURCES world/character_test.cpp)
 jfpx_add_test(trajectory_test SOURCES world/trajectory_test.cpp)
 jfpx_add_test(portable_files_test THESIS SOURCES world/portable_files_test.cpp)
 set_source_files_properties(world/portable_files_test.cpp PROPERTIES
