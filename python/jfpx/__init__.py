@@ -6,6 +6,7 @@ threads. Units of worlds are SI; vectors are (x, y, z), and quaternions (w, x, y
 of the package derive from jfpx.Error.
 """
 
+from ._character import CharacterHit, CharacterMove, CharacterSettings, CharacterState
 from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,
                         PeriodicRows, Rows, SphereCollider, available_backends, find_contacts,
                         find_pairs)
@@ -28,7 +29,7 @@ __version__ = "0.3.0"
 
 __all__ = [
     "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyDistance", "BodyDistances", "BodyId",
-    "BodyState", "Bungee", "Buoyancy", "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts",
+    "BodyState", "Bungee", "Buoyancy", "CharacterHit", "CharacterMove", "CharacterSettings", "CharacterState", "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts",
     "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError",
     "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene",
     "InvalidSnapshot", "JointId", "JointState", "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows",

@@ -10,11 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import _arrays, _device
+from ._character import CharacterHit, CharacterMove, CharacterSettings, CharacterState
 from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._joints import JointId, JointState, arguments, joint_of
 from ._scene import Scene, no_gravity
 from ._view import View, view_of_world
+
+_GROUND_STATES = ("air", "ground", "steep")  # in the order of GroundState of C++
 
 
 class StepReport(NamedTuple):
@@ -1270,6 +1273,48 @@ class World:
                                self._rows(size), self._rows(size))
         self._core.closest_bodies(self._solid_or_point(shape), positions, turned, limits, *result)
         return result
+
+    def move_character(self, state: CharacterState, dt: float,
+                       settings: CharacterSettings = CharacterSettings(), *,
+                       filter: Callable[[BodyId], bool] | None = None) -> CharacterMove:
+        """Moves a character by `dt` with the velocity of its state, to which the program has added
+        gravity, the wanted direction and jumps. Call it once after each step, with the dt of the
+        scene. On the ground, the character walks along the surface, climbs steps and slides along
+        walls; a downward velocity has no effect there. The world does not change: a program can push
+        the bodies that were hit by apply_impulse(). Equal arguments and worlds give equal bits.
+
+        Parameters
+        ----------
+        state : CharacterState
+            State before the move; CharacterState(position) is one in the air.
+        dt : float
+            [s], > 0
+        settings : CharacterSettings
+            Shape and abilities.
+        filter : function, optional
+            Called with the BodyId of a body that is in the way, several times for some; the body is
+            an obstacle if the result is true. Sensors never are. It must not change the world.
+
+        Raises
+        ------
+        InvalidArgument
+            A number is out of its range, or the move ends outside [-1e9, 1e9].
+        OutOfMemory, DeviceError, and exceptions of `filter`
+        """
+        if state.ground not in _GROUND_STATES:
+            raise InvalidArgument(f'ground is {state.ground!r}; it must be "air", "ground" or "steep"')
+        numbers = [_arrays.number(getattr(settings, name), name)
+                   for name in ("radius", "half_height", "max_slope", "step_height", "skin")]
+        *values, hits = self._core.move_character(
+            numbers, _arrays.triple(settings.up, "up"), _arrays.triple(state.position, "position"),
+            _arrays.triple(state.velocity, "velocity"), _GROUND_STATES.index(state.ground),
+            state.ground_body, _arrays.triple(state.ground_normal, "ground_normal"),
+            _arrays.number(dt, "dt"), _of_body(filter))
+        position, velocity, ground, body, normal, ground_velocity = values
+        return CharacterMove(
+            CharacterState(position, velocity, _GROUND_STATES[ground],
+                           None if body is None else BodyId(*body), normal, ground_velocity),
+            [CharacterHit(BodyId(*hit[0]), *hit[1:]) for hit in hits])
 
     def overlapping(self, shape: dict[str, Any], position: Vector,
                     orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:

@@ -1,4 +1,7 @@
-/// Binding of the contacts, events and queries of worlds. A body in an array is its BodyId::index.
+/// Binding of the contacts, events, queries and characters of worlds. A body in an array is its
+/// BodyId::index.
+#include <jfpx/character.hpp>
+
 #include "python/src/world.hpp"
 
 namespace jfpx {
@@ -218,6 +221,39 @@ BodyFilter to_filter(const nb::object& filter) {
   return [&filter](BodyId id) { return nb::cast<bool>(filter(to_tuple(id))); };
 }
 
+/// @param numbers radius, half_height, max_slope, step_height, skin
+nb::tuple move_one(const PythonWorld& self, const std::array<double, 5>& numbers, const Triple& up,
+                   const Triple& position, const Triple& velocity, int ground,
+                   const std::optional<IdTuple>& body, const Triple& normal, double dt,
+                   const nb::object& filter) {
+  CharacterSettings settings;
+  settings.radius = static_cast<Real>(numbers[0]);
+  settings.half_height = static_cast<Real>(numbers[1]);
+  settings.max_slope = static_cast<Real>(numbers[2]);
+  settings.step_height = static_cast<Real>(numbers[3]);
+  settings.skin = static_cast<Real>(numbers[4]);
+  settings.up = to_vec3(up);
+  settings.filter = to_filter(filter);
+  CharacterState state;
+  state.position = to_vec3(position);
+  state.velocity = to_vec3(velocity);
+  state.ground_state = static_cast<GroundState>(ground);
+  if (body) state.ground_body = to_id(*body);
+  state.ground_normal = to_vec3(normal);
+  const CharacterMove move = move_character(self.get(), settings, state, static_cast<Real>(dt));
+  nb::list hits;
+  for (const CharacterHit& hit : move.hits) {
+    hits.append(nb::make_tuple(to_tuple(hit.body), to_triple(hit.point), to_triple(hit.normal),
+                               static_cast<double>(hit.approach_speed)));
+  }
+  const CharacterState& s = move.state;
+  std::optional<IdTuple> below;
+  if (s.ground_state != GroundState::air) below = to_tuple(s.ground_body);
+  return nb::make_tuple(to_triple(s.position), to_triple(s.velocity),
+                        static_cast<int>(s.ground_state), below, to_triple(s.ground_normal),
+                        to_triple(s.ground_velocity), hits);
+}
+
 std::vector<IdTuple> to_tuples(const std::vector<BodyId>& ids) {
   std::vector<IdTuple> tuples;
   for (const BodyId id : ids) tuples.push_back(to_tuple(id));
@@ -314,6 +350,9 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
           },
           nb::arg("shape").none(), nb::arg("position"), nb::arg("orientation"),
           nb::arg("max_distance"), nb::arg("filter").none())
+      .def("move_character", &move_one, nb::arg("numbers"), nb::arg("up"), nb::arg("position"),
+           nb::arg("velocity"), nb::arg("ground"), nb::arg("body").none(), nb::arg("normal"),
+           nb::arg("dt"), nb::arg("filter").none())
       .def("overlapping",
            [](const PythonWorld& self, const Scene& shape, Triple position, Quadruple orientation) {
              return to_tuples(self.get().overlapping(to_solid_shape(shape), to_vec3(position),

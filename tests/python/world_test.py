@@ -418,6 +418,33 @@ def test_distances_agree_with_the_formula_of_a_sphere(rng, dtype):
     assert world.closest_body((0, 0, 99), max_distance=9) is None
 
 
+def test_a_character_walks_pushes_and_jumps(dtype):
+    crate = {"shape": {"type": "box", "half_extents": [0.5, 0.5, 0.5]}, "position": [3, 0.5, 0], "mass": 20}
+    world = jfpx.World({"bodies": [GROUND, crate]}, dtype=dtype)
+    settings = jfpx.CharacterSettings(radius=0.25, step_height=0.3)
+    state = jfpx.CharacterState((0, 0.87, 0))
+    assert state.ground == "air" and state.ground_body is None
+    pushed = []
+    for n in range(90):
+        world.run(1)
+        state, hits = world.move_character(state._replace(velocity=(2, -1, 0)), 1 / 60, settings)
+        pushed += [hit for hit in hits if hit.body == world.bodies[1]]
+    assert state.ground == "ground" and state.ground_body == world.bodies[0]
+    assert state.ground_normal == (0, 1, 0) and state.ground_velocity == (0, 0, 0)
+    assert state.position == pytest.approx((2.5 - 0.25 - 0.02, 0.87, 0), abs=1e-3)
+    assert pushed[0].approach_speed == pytest.approx(2) and pushed[0].normal == pytest.approx((-1, 0, 0), abs=1e-5)
+    assert pushed[0].point[0] == pytest.approx(2.5, abs=1e-3)
+    world.apply_impulse(pushed[0].body, (40, 0, 0))
+    through = world.move_character(state._replace(velocity=(60, 0, 0)), 1 / 60, settings,
+                                   filter=lambda body: body == world.bodies[0])
+    assert through.state.position[0] == pytest.approx(state.position[0] + 1, abs=1e-3)
+    assert through.hits == []
+    jump = world.move_character(state._replace(velocity=(0, 5, 0)), 1 / 60, settings).state
+    assert jump.ground == "air" and jump.ground_body is None and jump.velocity == (0, 5, 0)
+    again = world.move_character(state._replace(velocity=(0, 5, 0)), 1 / 60, settings).state
+    assert again == jump
+
+
 def test_a_distance_query_turns_the_solid(dtype):
     world = jfpx.World({"bodies": [GROUND]}, dtype=dtype)
     stick = {"type": "capsule", "radius": 0.25, "half_height": 1}
@@ -928,6 +955,10 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: w.cast_ray((0, 0, 0), (0, 0, 1), filter=3), jfpx.InvalidArgument, "filter is 3"),
     (lambda w: w.closest_body((0, 0, 0), max_distance=-1), jfpx.InvalidArgument, "max_distance is -1"),
     (lambda w: w.closest_body((0, 0, 0), GROUND["shape"]), jfpx.InvalidArgument, "no solid"),
+    (lambda w: w.move_character(jfpx.CharacterState((0, 1, 0)), 0), jfpx.InvalidArgument, "dt is 0"),
+    (lambda w: w.move_character(jfpx.CharacterState((0, 1, 0), ground="up"), 1), jfpx.InvalidArgument, "ground is 'up'"),
+    (lambda w: w.move_character(jfpx.CharacterState((0, 1, 0)), 1, jfpx.CharacterSettings(skin=1)),
+     jfpx.InvalidArgument, "skin is 1"),
     (lambda w: w.bodies_within((0, 0, 0), 1, filter=3), jfpx.InvalidArgument, "filter is 3"),
     (lambda w: w.closest_bodies([[0, 0, 0]], max_distances=-1), jfpx.InvalidArgument, "query 0: max_"),
     (lambda w: w.closest_bodies([[0, 0, 0]], None, np.zeros((3, 4))), jfpx.InvalidArgument, "3 rows"),
