@@ -29,12 +29,13 @@ __version__ = "0.3.0"
 
 __all__ = [
     "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyDistance", "BodyDistances", "BodyId",
-    "BodyState", "Bungee", "Buoyancy", "CharacterHit", "CharacterMove", "CharacterSettings", "CharacterState", "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts",
-    "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError",
-    "FixedJoint", "ForceContext", "Gravity", "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene",
-    "InvalidSnapshot", "JointId", "JointState", "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows",
-    "PeriodicContacts", "PeriodicNearest", "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording",
-    "RecordingWriter", "Rows", "STAY", "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring",
-    "States", "StepReport", "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends",
-    "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "scene_names",
+    "BodyState", "Bungee", "Buoyancy", "CharacterHit", "CharacterMove", "CharacterSettings", "CharacterState",
+    "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts", "DeviceError",
+    "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError", "FixedJoint", "ForceContext", "Gravity",
+    "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene", "InvalidSnapshot", "JointId", "JointState",
+    "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows", "PeriodicContacts", "PeriodicNearest",
+    "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording", "RecordingWriter", "Rows", "STAY",
+    "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring", "States", "StepReport",
+    "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends", "find_contacts",
+    "find_nearest", "find_neighbors", "find_pairs", "scene_names",
 ]
