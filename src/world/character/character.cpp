@@ -91,16 +91,16 @@ class CharacterMover {
         least_rise_(cosine(settings.max_slope)),
         position_(state.position),
         rise_(dot(state.velocity, up_)),
-        level_(state.velocity - up_ * rise_) {
+        level_(state.velocity - up_ * rise_),
+        standing_(state.ground_state == GroundState::ground && world.contains(state.ground_body)),
+        held_(standing_ && !is_walkable(state.ground_normal)),
+        walking_(standing_ && !held_ && rise_ < kJumpSpeed) {
     cast_.shape = Capsule{settings.radius, settings.half_height};
     cast_.orientation = upright(up_);
     filter_ = [this](BodyId id) {
       return id != ignored_ && !world_.sensor(id) && !(only_fixed_ && moves(id)) &&
              (!settings_.filter || settings_.filter(id));
     };
-    standing_ = before_.ground_state == GroundState::ground && world_.contains(before_.ground_body);
-    held_ = standing_ && !is_walkable(before_.ground_normal);
-    walking_ = standing_ && !held_ && rise_ < kJumpSpeed;
     ground_ = walking_ ? before_.ground_normal : up_;
     if (walking_) rise_ = 0;
     // Presses down, to find out whether it still is held.
