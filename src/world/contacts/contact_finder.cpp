@@ -18,7 +18,7 @@ namespace {
 using soft_step::ContactSet;
 
 // A chunk takes about five microseconds.
-constexpr std::size_t kSubShapesPerChunk = 256, kPairsPerChunk = 256, kCandidatesPerChunk = 32;
+constexpr std::size_t kSubShapesPerChunk = 256, kPairsPerChunk = 256, kCandidatesPerChunk = 64;
 constexpr std::size_t kFewestItems = 32, kFewestCandidates = 8;
 /// Chunks of a batch for each thread: enough to balance their loads.
 constexpr std::size_t kChunksPerThread = 16;

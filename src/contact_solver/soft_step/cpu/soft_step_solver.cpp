@@ -21,6 +21,9 @@ inline namespace JFPX_ABI {
 namespace soft_step {
 namespace {
 
+/// Binary logarithm of the bodies of a part with fixed bodies, in a world of one block. In smaller
+/// parts, more vectors of rows are incomplete.
+constexpr unsigned kFixedPartBits = 7;
 // Chunks take a few microseconds, so that small worlds have chunks for many threads.
 constexpr std::size_t kContactsPerChunk = 512;
 constexpr std::size_t kRowsPerKernel = 64;
@@ -191,10 +194,14 @@ void SoftStepSolver::inspect_contacts() {
                       [](const Ends& x, const Ends& y) {
                         return Ends{std::max(x.inner, y.inner), std::max(x.crossing, y.crossing)};
                       });
-  const std::size_t parts =
-      has_blocks_ ? blocks_.size()
-                  : (bodies_.size() + (std::size_t{1} << part_bits_) - 1) >> part_bits_;
-  shape_ = {parts, has_blocks_ ? ends.inner : 0, ends.crossing, parts};
+  if (has_blocks_) {
+    shape_ = {blocks_.size(), ends.inner, ends.crossing, blocks_.size()};
+  } else {
+    const auto parts = [this](unsigned bits) {
+      return (bodies_.size() + (1u << bits) - 1) >> bits;
+    };
+    shape_ = {parts(part_bits_), 0, ends.crossing, parts(kFixedPartBits)};
+  }
 }
 
 /// Finds the contacts of each body a in a list that is sorted by key.
@@ -234,6 +241,11 @@ std::uint32_t SoftStepSolver::part_of(std::uint32_t body) const {
   return has_blocks_ ? blocks_.block(body) : body >> part_bits_;
 }
 
+/// Part of the contacts of a movable body with fixed bodies.
+std::uint32_t SoftStepSolver::fixed_part_of(std::uint32_t body) const {
+  return has_blocks_ ? blocks_.block(body) : body >> kFixedPartBits;
+}
+
 /// Divides the listed contacts into the overflow, and those with fixed bodies by part.
 void SoftStepSolver::group_fixed() {
   const auto is_overflow = [this](const ListedContact& listed) {
@@ -246,14 +258,14 @@ void SoftStepSolver::group_fixed() {
     if (is_overflow(listed)) {
       overflow_.push_back(listed);
     } else {
-      ++fixed_begin_[part_of(listed.body) + 2];
+      ++fixed_begin_[fixed_part_of(listed.body) + 2];
       ++count;
     }
   }
   std::partial_sum(fixed_begin_.begin(), fixed_begin_.end(), fixed_begin_.begin());
   resize_geometric(&fixed_, count);
   for (const ListedContact& listed : listed_) {
-    if (!is_overflow(listed)) fixed_[fixed_begin_[part_of(listed.body) + 1]++] = listed;
+    if (!is_overflow(listed)) fixed_[fixed_begin_[fixed_part_of(listed.body) + 1]++] = listed;
   }
   std::ranges::sort(overflow_, [](const ListedContact& x, const ListedContact& y) {
     return std::tie(x.kind, x.contact) < std::tie(y.kind, y.contact);

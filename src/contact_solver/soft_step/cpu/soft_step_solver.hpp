@@ -177,6 +177,7 @@ class SoftStepSolver {
   template <class F>
   void for_contacts(std::size_t part, const F& f) const;
   std::uint32_t part_of(std::uint32_t body) const;
+  std::uint32_t fixed_part_of(std::uint32_t body) const;
   std::span<ListedContact> fixed_of(std::size_t part) {
     return std::span(fixed_).subspan(fixed_begin_[part],
                                      fixed_begin_[part + 1] - fixed_begin_[part]);
