@@ -125,7 +125,6 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   void run_chunks(std::uint64_t job, std::size_t first, std::uint64_t count);
   void report(unsigned self, std::uint64_t done);
   bool is_complete(std::uint64_t job) const;
-  bool has_ended(std::uint64_t phase) const;
   std::uint64_t first_chunk(std::uint64_t chunks, unsigned owner) const;
 
   /// Workers that pools may share.
@@ -331,7 +330,7 @@ void ThreadPool::Workers::take_phases(unsigned self, std::uint64_t number) {
     const std::uint64_t job = of_job(number + phase, chunks);
     std::uint64_t done = 0;
     take_chunks_of(self, self, job, &done);
-    for (unsigned i = 0; !has_ended(job); ++i) {
+    for (unsigned i = 0; !is_complete(job); ++i) {
       // A worker that has not joined has left its chunks.
       if (i == std::min(polls_, kPollsBeforeHelp)) take_chunks_of_others(self, job, &done);
       i < polls_ ? pause() : std::this_thread::yield();
@@ -382,25 +381,16 @@ std::uint64_t ThreadPool::Workers::first_chunk(std::uint64_t chunks, unsigned ow
   return chunks * owner / thread_count_;
 }
 
-/// Whether all chunks are completed.
+/// Whether all chunks of a job or phase are completed. A later phase begins after the end of this
+/// one.
 bool ThreadPool::Workers::is_complete(std::uint64_t job) const {
   std::uint64_t sum = 0;
   for (unsigned thread = 0; thread < thread_count_; ++thread) {
     const std::uint64_t done = chunks_[thread].done.load();
+    if (number_of(done) > number_of(job)) return true;
     if (number_of(done) == number_of(job)) sum += count_of(done);
   }
   return sum == count_of(job);
-}
-
-/// Whether all chunks of a phase are completed. @param phase its number and chunks
-bool ThreadPool::Workers::has_ended(std::uint64_t phase) const {
-  std::uint64_t sum = 0;
-  for (unsigned thread = 0; thread < thread_count_; ++thread) {
-    const std::uint64_t done = chunks_[thread].done.load(std::memory_order_acquire);
-    if (number_of(done) > number_of(phase)) return true;
-    if (number_of(done) == number_of(phase)) sum += count_of(done);
-  }
-  return sum == count_of(phase);
 }
 
 /// Takes the chunks of worker `self`, then remaining chunks of other threads.

@@ -14,7 +14,7 @@ namespace {
 
 /// Below this number of spheres, testing all pairs takes about the same time.
 constexpr std::size_t kFewest = 512;
-constexpr std::size_t kSpheresPerChunk = 1024;
+constexpr std::size_t sphere_chunk(std::size_t spheres) { return chunk_size(spheres, 128, 1024); }
 /// The slack is the motion of about kSearches searches, limited to fractions of the smallest
 /// radius. More slack means more pairs to test in every search (bench/results/soft_step.md).
 constexpr Real kSearches = 10, kLeast = Real(0.02), kMost = Real(0.15);
@@ -39,8 +39,7 @@ Real NeighborList::largest_motion(std::span<const SphereInstance> spheres, Threa
     }
     return largest;
   };
-  return slack_ + parallel_reduce(pool, spheres.size(),
-                                  chunk_size(spheres.size(), 128, kSpheresPerChunk), -slack_,
+  return slack_ + parallel_reduce(pool, spheres.size(), sphere_chunk(spheres.size()), -slack_,
                                   largest_of, larger);
 }
 
@@ -51,9 +50,8 @@ Real NeighborList::choose_slack(std::span<const SphereInstance> spheres, Real mo
     return std::ranges::min(spheres.subspan(first, last - first), {}, &SphereInstance::radius)
         .radius;
   };
-  const Real smallest =
-      parallel_reduce(pool, spheres.size(), chunk_size(spheres.size(), 128, kSpheresPerChunk),
-                      spheres[0].radius, smallest_of, std::ranges::min);
+  const Real smallest = parallel_reduce(pool, spheres.size(), sphere_chunk(spheres.size()),
+                                        spheres[0].radius, smallest_of, std::ranges::min);
   const bool pays = kFewestSearches * motion <= kMost * smallest;
   if (!pays || !(smallest >= kLeastRadius)) return 0;
   return std::clamp(kSearches * motion, kLeast * smallest, kMost * smallest);
@@ -74,7 +72,7 @@ NeighborPairs NeighborList::find(std::span<const SphereInstance> spheres, Sphere
   }
   clear();
   bounds_.reserve(spheres.size(), "bounds of spheres");
-  parallel_for(pool, spheres.size(), chunk_size(spheres.size(), 128, kSpheresPerChunk),
+  parallel_for(pool, spheres.size(), sphere_chunk(spheres.size()),
                [&](std::size_t first, std::size_t last) {
                  for (std::size_t i = first; i < last; ++i) {
                    bounds_[i] = {spheres[i].centre, spheres[i].radius + slack};
