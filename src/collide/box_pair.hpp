@@ -180,26 +180,37 @@ JFPX_HD inline void face_points(const Vec3& half, int face, Real side, const Vec
                                 Manifold* manifold) {
   const Vec3 outward = unit_axis(face) * side;
   int incident = 0;
-  Polygon polygon = facing_quad(other_half, rotation, offset, outward, &incident);
-  for (int k = 1; k < 3; ++k) {
-    const int axis = (face + k) % 3;
-    polygon = clipped(polygon, axis, 1, half[axis], 2 * k + 2);
-    polygon = clipped(polygon, axis, -1, half[axis], 2 * k + 3);
-  }
+  Polygon polygon;
   const auto keep = [&](const Vec3& p, Real distance, int feature) {
     const int faces = 6 * (2 * face + (side > 0 ? 0 : 1)) + incident;
     manifold->points[manifold->count++] = {add_scaled(p, outward, distance * Real(-0.5)), distance,
                                            static_cast<std::uint32_t>(64 * faces + feature)};
   };
-  for (int i = 0; i < polygon.count; ++i) {
-    const Real distance = side * polygon.corner[i][face] - half[face];
-    const int before = polygon.edge[i == 0 ? polygon.count - 1 : i - 1];
-    if (distance <= margin) keep(polygon.corner[i], distance, 8 * before + polygon.edge[i]);
+  // For faces that touch along an edge, rounding may remove all points. Then the sides are
+  // enlarged.
+  const Real error = 16 * kEpsilon * (length(half) + length(other_half));
+  for (int pass = 0; pass < 2; ++pass) {
+    const Real slack = pass == 0 ? Real(0) : error;
+    polygon = facing_quad(other_half, rotation, offset, outward, &incident);
+    for (int k = 1; k < 3; ++k) {
+      const int axis = (face + k) % 3;
+      polygon = clipped(polygon, axis, 1, half[axis] + slack, 2 * k + 2);
+      polygon = clipped(polygon, axis, -1, half[axis] + slack, 2 * k + 3);
+    }
+    for (int i = 0; i < polygon.count; ++i) {
+      const Real distance = side * polygon.corner[i][face] - half[face];
+      const int before = polygon.edge[i == 0 ? polygon.count - 1 : i - 1];
+      if (distance <= margin) keep(polygon.corner[i], distance, 8 * before + polygon.edge[i]);
+    }
+    if (manifold->count > 0 || !(manifold->distance <= 0)) return;
   }
-  // For faces that touch along an edge, rounding may remove all points.
-  if (manifold->count == 0 && manifold->distance <= 0) {
-    keep(support(other_half, rotation, offset, -outward), manifold->distance, 0);
+  // By rounding, all points are above the margin, or there are none.
+  Vec3 lowest =
+      polygon.count > 0 ? polygon.corner[0] : support(other_half, rotation, offset, -outward);
+  for (int i = 1; i < polygon.count; ++i) {
+    if (side * polygon.corner[i][face] < side * lowest[face]) lowest = polygon.corner[i];
   }
+  keep(lowest, manifold->distance, 0);
 }
 
 /// The midpoint between the closest points of two lines (Goldman 1990), clamped to the edges: edge

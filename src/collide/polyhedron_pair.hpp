@@ -304,7 +304,10 @@ JFPX_HD void visit_contact_points(const PolyhedronPair<A, B>& pair, const Polyhe
     constexpr std::uint32_t kEdges = 0x80000000u, kMostEdges = 512;
     const EdgePoints closest =
         closest_of_edges(pa, pair.a.vertex(ea.b) - pa, pb, pair.vertex_of_b(eb.b) - pb);
-    add(closest.middle(), axis.overlap.distance, kEdges + first * kMostEdges + second);
+    // Rounding may select edges of solids in contact that do not cross.
+    if (axis.overlap.distance > 0 || closest.are_on(axis.overlap)) {
+      add(closest.middle(), axis.overlap.distance, kEdges + first * kMostEdges + second);
+    }
     return;
   }
   // The normal of the reference face points to the other polyhedron.
@@ -335,34 +338,6 @@ JFPX_HD void visit_contact_points(const PolyhedronPair<A, B>& pair, const Polyhe
   } else {
     visit_face_points(of_b, of_a, all, 0, keep);
   }
-}
-
-/// The vertex that is deepest below a reference face. Of vertices that are equally deep, that
-/// which is nearest to the centre of the other polyhedron.
-template <class A, class B, class Add>
-JFPX_HD void visit_deepest_vertex(const PolyhedronPair<A, B>& pair, const PolyhedronAxis& axis,
-                                  const Add& add) {
-  const bool is_of_a = axis.kind == PolyhedronAxis::face_of_a;
-  const Vec3 n = is_of_a ? -axis.overlap.normal : axis.overlap.normal;
-  const int count = is_of_a ? pair.b.vertex_count() : pair.a.vertex_count();
-  const auto vertex = [&](int i) { return is_of_a ? pair.vertex_of_b(i) : pair.a.vertex(i); };
-  Real least = kMaxReal;
-  for (int i = 0; i < count; ++i) {
-    const Real height = dot(n, vertex(i));
-    if (height < least) least = height;
-  }
-  const Vec3 centre = is_of_a ? pair.a.centre() : pair.rotation * pair.b.centre() + pair.offset;
-  Vec3 lowest;
-  Real nearest = kMaxReal;
-  for (int i = 0; i < count; ++i) {
-    const Vec3 p = vertex(i);
-    const Real distance = length_squared(p - centre);
-    if (!(dot(n, p) <= least + 2 * axis.overlap.error) || !(distance < nearest)) continue;
-    nearest = distance;
-    lowest = p;
-  }
-  add(add_scaled(lowest, n, axis.overlap.distance * Real(-0.5)), axis.overlap.distance,
-      PointFeature::kCount - 1);
 }
 
 }  // namespace detail

@@ -2,6 +2,7 @@
 /// oracle in double that does not use separating axes.
 #include <jfpx/collide.hpp>
 
+#include "tests/collide/random_solids.hpp"
 #include "tests/world/support.hpp"
 
 #include <gtest/gtest.h>
@@ -232,6 +233,32 @@ TEST(BoxBox, AgreesWithTheOracleInContactDepthAndDirection) {
   EXPECT_GT(touches, 20000);
   EXPECT_GT(clear, 20000);
   EXPECT_GT(edges, 1000);
+}
+
+/// Rounding may leave all points of the faces above the contact, or, along an edge, no points.
+TEST(BoxBox, FacesInExactContactHavePointsOnBothBoxes) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int touches = 0;
+  for (int n = 0; n < 100000; ++n) {
+    Case c = random_case(&random);
+    c.pose_b = c.pose_a * test::touching_pose(c.a.half_extents, c.b.half_extents, &random);
+    if (random.below(2) == 0) std::swap(c.a, c.b), std::swap(c.pose_a, c.pose_b);
+    const double noise = tolerance(c);
+    const Manifold m = collide(c.a, c.pose_a, c.b, c.pose_b);
+    if (m.count == 0) continue;
+    ++touches;
+    const PosedBox a(c.a, c.pose_a, noise), b(c.b, c.pose_b, noise);
+    for (int k = 0; k < m.count; ++k) {
+      const Vec3& p = m.points[k].point;
+      for (const PosedBox* box : {&a, &b}) {
+        const auto local = box->to_local({p.x, p.y, p.z});
+        for (int i = 0; i < 3; ++i) ASSERT_LE(std::abs(local[i]), box->half[i]) << n;
+      }
+    }
+  }
+  EXPECT_GT(touches, 20000);
 }
 
 TEST(BoxBox, SwappedOrTransformedBoxesHaveTheSameContact) {

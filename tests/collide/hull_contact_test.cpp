@@ -101,6 +101,51 @@ TEST(HullContact, PointsAreInTheOverlap) {
   EXPECT_GT(points, 100u);
 }
 
+std::vector<Vec3> corners_of(const Vec3& half) {
+  std::vector<Vec3> corners;
+  for (int i = 0; i < 8; ++i) {
+    corners.push_back({(i & 1) != 0 ? half.x : -half.x, (i & 2) != 0 ? half.y : -half.y,
+                       (i & 4) != 0 ? half.z : -half.z});
+  }
+  return corners;
+}
+
+/// As FacesInExactContactHavePointsOnBothBoxes of boxes.
+TEST(HullContact, FacesInExactContactHavePointsOnBothHulls) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  int touching = 0;
+  for (int n = 0; n < 4000; ++n) {
+    Vec3 half[2];
+    SolidShape shapes[2];
+    for (int k = 0; k < 2; ++k) {
+      half[k] = random.uniform_in_box({0.05_r, 0.05_r, 0.05_r}, {2, 2, 2});
+      if (k == 1 && random.below(2) == 0) {
+        shapes[k] = Box{half[k]};
+      } else {
+        shapes[k] = Hull(corners_of(half[k]));
+      }
+    }
+    Transform poses[2] = {make_transform(test::random_rotation(&random), {})};
+    poses[1] = poses[0] * test::touching_pose(half[0], half[1], &random);
+    if (random.below(2) == 0) {
+      std::swap(half[0], half[1]), std::swap(shapes[0], shapes[1]), std::swap(poses[0], poses[1]);
+    }
+    const detail::PairManifold found = contact_between(shapes[0], poses[0], shapes[1], poses[1]);
+    for (std::uint32_t k = 0; k < found.touch_count; ++k) {
+      ++touching;
+      for (int i = 0; i < 2; ++i) {
+        const Vec3 local = inverse_transform_point(poses[i], found.touches[k].point);
+        for (int axis = 0; axis < 3; ++axis) {
+          ASSERT_LE(absolute(local[axis]), half[i][axis] + 1e-4_r) << n << ", shape " << i;
+        }
+      }
+    }
+  }
+  EXPECT_GT(touching, 1000);
+}
+
 /// A hull with the vertices of a box has the contacts of the box, to rounding.
 TEST(HullContact, AHullOfABoxHasTheContactsOfTheBox) {
   const std::uint64_t seed = test::fresh_seed();
@@ -109,13 +154,7 @@ TEST(HullContact, AHullOfABoxHasTheContactsOfTheBox) {
   int touching = 0;
   for (int n = 0; n < 3000; ++n) {
     const Box box{random.uniform_in_box({0.2_r, 0.2_r, 0.2_r}, {0.8_r, 0.8_r, 0.8_r})};
-    std::vector<Vec3> corners;
-    for (int i = 0; i < 8; ++i) {
-      corners.push_back({(i & 1) != 0 ? box.half_extents.x : -box.half_extents.x,
-                         (i & 2) != 0 ? box.half_extents.y : -box.half_extents.y,
-                         (i & 4) != 0 ? box.half_extents.z : -box.half_extents.z});
-    }
-    const Hull hull(corners);
+    const Hull hull(corners_of(box.half_extents));
     ASSERT_EQ(hull.faces().size(), 6u);
     const SolidShape other = partner(random.below(3), &random);
     const Transform at = make_transform(test::random_rotation(&random), {});

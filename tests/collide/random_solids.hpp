@@ -26,6 +26,25 @@ inline SolidShape partner(std::uint64_t kind, Random* random) {
   if (kind == 3) return random_hull(random);
   return round_solid(random);
 }
+/// A pose of box b in the axes of box a for which a face of a and a face of b, maybe turned about
+/// its normal, are in the same plane: they overlap, or touch along edges or at corners up to
+/// rounding.
+inline Transform touching_pose(const Vec3& half_a, const Vec3& half_b, Random* random) {
+  const auto face = static_cast<int>(random->below(3));
+  Quat turn{1, 0, 0, 0};
+  if (random->below(2) == 0) {
+    const Real angle = random->uniform(-1, 1);
+    turn = normalized(Quat{1, face == 0 ? angle : 0, face == 1 ? angle : 0, face == 2 ? angle : 0});
+  }
+  Transform pose = make_transform(turn, {});
+  for (int i = 0; i < 3; ++i) {
+    Real reach = half_a[i];
+    for (int j = 0; j < 3; ++j) reach += absolute(pose.basis(i, j)) * half_b[j];
+    pose.origin[i] = i == face || random->below(4) == 0 ? reach : reach * random->uniform(-1, 1);
+  }
+  return pose;
+}
+
 /// A random rotation, or one of an axis near an axis of the world.
 inline Quat random_tilt(Random* random) {
   if (random->below(2) == 0) return random_rotation(random);

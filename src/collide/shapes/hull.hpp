@@ -5,6 +5,7 @@
 #include "src/collide/hull_point.hpp"
 #include "src/collide/hull_triangle.hpp"
 #include "src/collide/polyhedron_pair.hpp"
+#include "src/collide/round/convex_pair.hpp"
 #include "src/collide/shapes/capsule.hpp"
 
 namespace jfpx {
@@ -172,14 +173,19 @@ JFPX_HD void find_contact_of_polyhedra(const A& a, const Transform& pose_a, cons
   };
   PolyhedronAxis axis = axes.preferred;
   visit_contact_points(polyhedra, axis, pair.margin, add);
-  // Faces that are not the widest axis may not overlap. Then the widest axis has a point, which may
-  // not be on the incident face, or is removed by rounding.
+  // Faces that are not the widest axis may not overlap. Then the widest axis has a point. If it is
+  // not on the incident face, or is removed by rounding, it is the closest point of the solids.
   if (selection.is_empty()) {
     axis = axes.widest;
     visit_contact_points(polyhedra, axis, pair.margin, add);
   }
-  if (selection.is_empty() && axis.overlap.distance <= pair.margin) {
-    visit_deepest_vertex(polyhedra, axis, add);
+  const Real distance = axis.overlap.distance;
+  if (selection.is_empty() && distance <= pair.margin) {
+    const ConvexPair<A, B> solids{a,  b,  polyhedra.rotation, polyhedra.offset,
+                                  {}, {}, polyhedra.size};
+    const Vec3& n = axis.overlap.normal;
+    const Vec3 on_a = closest_point_of_a(solids, n, distance);
+    add(add_scaled(on_a, n, distance * Real(-0.5)), distance, PointFeature::kCount - 1);
   }
   manifold->normal = pose_a.basis * axis.overlap.normal;
   add_selected(selection, pose_a, pair.motion * t, pair, manifold);
