@@ -1,6 +1,6 @@
 # Installation of libraries with their CMake and pkg-config files, headers and programs. The installation is
 # relocatable: no file contains the prefix. Components follow Debian's conventions: runtime, runtime_thesis,
-# runtime_bullet, dev, tools, doc.
+# runtime_bullet, runtime_mpi, dev, tools, doc.
 if(JFPX_INSTALL)
   foreach(folder IN ITEMS BINDIR LIBDIR INCLUDEDIR)
     if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
@@ -92,7 +92,7 @@ function(_jfpx_install_pkg_config file suffix)
   endif()
   set(requires "")
   set(libraries "-L\${libdir} -l${file}")
-  string(REGEX REPLACE "-(bullet|thesis)" "" core ${file})
+  string(REGEX REPLACE "-(bullet|thesis|mpi)" "" core ${file})
   if(file MATCHES "bullet")
     set(description "${description}: the adapter for Bullet")
     set(bullet bullet)
@@ -102,6 +102,9 @@ function(_jfpx_install_pkg_config file suffix)
     set(requires "${core} = ${PROJECT_VERSION}, ${bullet} = ${JFPX_BULLET_VERSION}")
   elseif(file MATCHES "thesis")
     set(description "${description}: the solver and the particles of the thesis")
+    set(requires "${core} = ${PROJECT_VERSION}")
+  elseif(file MATCHES "mpi") # the flags of MPI are those of its compilers, for example mpicxx
+    set(description "${description}: communication by MPI")
     set(requires "${core} = ${PROJECT_VERSION}")
   elseif(NOT BUILD_SHARED_LIBS)
     string(APPEND libraries " -pthread")
@@ -126,6 +129,9 @@ if(NOT JFPX_HAS_BULLET)
 endif()
 if(NOT JFPX_HAS_CUDA)
   list(APPEND left_out PATTERN cuda EXCLUDE)
+endif()
+if(NOT JFPX_HAS_MPI)
+  list(APPEND left_out PATTERN mpi.hpp EXCLUDE)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/jfpx DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev
   FILES_MATCHING PATTERN *.hpp ${left_out})

@@ -9,6 +9,8 @@ set(JFPX_VIEWER AUTO CACHE STRING "Viewer: AUTO (if SDL2, epoxy, imgui and libpn
 set_property(CACHE JFPX_VIEWER PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_ASSIMP AUTO CACHE STRING "Files of meshes in the programs: AUTO (if assimp is found), ON (required) or OFF")
 set_property(CACHE JFPX_ASSIMP PROPERTY STRINGS AUTO ON OFF)
+set(JFPX_MPI AUTO CACHE STRING "Worlds on several ranks by MPI: AUTO (if MPI is found), ON (required) or OFF")
+set_property(CACHE JFPX_MPI PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_PYTHON OFF CACHE STRING "Python package: AUTO (if Python and nanobind are found), ON (required) or OFF")
 set_property(CACHE JFPX_PYTHON PROPERTY STRINGS AUTO ON OFF)
 set(JFPX_PRECISIONS both CACHE STRING "Precisions that are built, tested and installed: float, double or both")
@@ -22,7 +24,7 @@ option(JFPX_COVERAGE "Count which lines of src are run, in float; see scripts/co
 option(JFPX_INSTALL "Install libraries, headers and programs" ${PROJECT_IS_TOP_LEVEL})
 option(JFPX_WERROR "Treat warnings as errors, as the presets of developers do" OFF)
 
-foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER JFPX_ASSIMP JFPX_PYTHON)
+foreach(option IN ITEMS JFPX_CUDA JFPX_BULLET JFPX_VIEWER JFPX_ASSIMP JFPX_MPI JFPX_PYTHON)
   if(NOT "${${option}}" MATCHES "^(AUTO|ON|OFF)$")
     message(FATAL_ERROR "${option} is \"${${option}}\"; it takes AUTO, ON or OFF.")
   endif()

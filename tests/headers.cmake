@@ -1,5 +1,5 @@
 # Every public header, and so every installed one, compiles alone: without our other folders, without
-# CUDA, and all but bullet/ without Bullet.
+# CUDA, all but bullet/ without Bullet, and all but mpi.hpp without MPI.
 file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/include CONFIGURE_DEPENDS
      ${PROJECT_SOURCE_DIR}/include/jfpx/*.hpp)
 set(plain "")
@@ -16,6 +16,8 @@ foreach(header IN LISTS headers)
   file(GENERATE OUTPUT ${source} CONTENT "#include <${header}>\n")
   if(header MATCHES "^jfpx/bullet/")
     list(APPEND with_bullet ${source})
+  elseif(header STREQUAL "jfpx/mpi.hpp")
+    set(with_mpi ${source})
   else()
     list(APPEND plain ${source})
     string(APPEND all "#include <${header}>\n")
@@ -34,6 +36,10 @@ if(JFPX_HAS_BULLET AND with_bullet)
   add_library(bullet_headers_alone OBJECT ${with_bullet})
   target_link_libraries(bullet_headers_alone PRIVATE jfpx_bullet jfpx_warnings)
   set_target_properties(bullet_headers_alone PROPERTIES UNITY_BUILD OFF)
+endif()
+if(JFPX_HAS_MPI)
+  add_library(mpi_headers_alone OBJECT ${with_mpi})
+  target_link_libraries(mpi_headers_alone PRIVATE jfpx_mpi jfpx_warnings)
 endif()
 
 # An older standard is refused by name, before the errors that follow from it.

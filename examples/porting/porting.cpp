@@ -1,5 +1,6 @@
 /// Example of a small game scene: layers, a lift, a door, a character, a trigger and shots, with a
 /// fixed step that is interpolated for drawing. docs/porting.md has the terms of other engines.
+#include <jfpx/debug_draw.hpp>
 #include <jfpx/world.hpp>
 
 #include <algorithm>
@@ -41,6 +42,28 @@ bool is_on_ground(const jfpx::World& world, jfpx::BodyId player) {
   return hit && hit->normal.y > Real(0.7);
 }
 
+/// Lines for the renderer of the game.
+class Lines : public jfpx::DebugDraw {
+ public:
+  struct Vertex {
+    jfpx::Vec3 position;
+    jfpx::DebugColor color;
+  };
+  void line(const jfpx::Vec3& from, const jfpx::Vec3& to, jfpx::DebugColor color) override {
+    vertices.push_back({from, color});
+    vertices.push_back({to, color});
+  }
+  std::vector<Vertex> vertices;
+};
+
+/// Makes a body immovable where it is.
+void freeze(jfpx::World& world, jfpx::BodyId id) {
+  jfpx::BodyDef body = world.definition(id);
+  body.mass = 0;
+  body.velocity = body.angular_velocity = {};
+  world.replace(id, body);
+}
+
 }  // namespace
 
 int main() {
@@ -52,6 +75,14 @@ int main() {
   platform.kinematic = true;
   platform.velocity = {0, 1, 0};  // until set_state() changes it
   const jfpx::BodyId lift = world.add(platform);
+
+  jfpx::BodyDef belt = body(jfpx::Box{{4, Real(0.1), 1}}, {0, Real(0.1), -12}, 0, {kLevel});
+  belt.kinematic = true;
+  belt.motion_locks = jfpx::kFixedPose;
+  belt.velocity = {1, 0, 0};  // of its surface
+  world.add(belt);
+  const jfpx::BodyId parcel =
+      world.add(body(jfpx::Box{{Real(0.2), Real(0.2), Real(0.2)}}, {-3, Real(0.4), -12}, 5, {}));
 
   jfpx::HingeJoint hinge;
   hinge.a = world.add(body(jfpx::Box{{Real(0.5), 1, Real(0.05)}}, {-3, 1, 0}, 20, {kLevel}));
@@ -118,6 +149,8 @@ int main() {
       }
     }
   }
+  std::printf("the belt has carried the parcel by %.1f m\n",
+              static_cast<double>(world.state(parcel).position.x + 3));
   std::printf("the loudest impact had %.1f m/s\n", static_cast<double>(loudest));
   const jfpx::Vec3 drawn = interpolate(before, after, accumulator / kDt);
   std::printf("the player is drawn at z = %.2f m\n", static_cast<double>(drawn.z));
@@ -133,4 +166,11 @@ int main() {
     std::printf("shot at %.1f m: the crate moves at %.1f m/s\n", static_cast<double>(hit->distance),
                 static_cast<double>(-world.state(crate).velocity.z));
   }
+  freeze(world, crate);
+  world.step();
+  std::printf("frozen: the crate moves at %.1f m/s\n",
+              static_cast<double>(-world.state(crate).velocity.z));
+  Lines lines;
+  jfpx::debug_draw(world, &lines, {.contacts = true});
+  std::printf("%zu vertices of lines\n", lines.vertices.size());
 }

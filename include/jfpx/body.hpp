@@ -32,8 +32,9 @@ JFPX_HD constexpr bool may_collide(const CollisionFilter& a, const CollisionFilt
 }
 
 /// Axes of the world along which (linear) or about which (angular) a body does not move, as in
-/// Box2D. The body keeps its coordinates along locked axes, and its angular velocity about them is
-/// 0. See docs/world.md for how contacts and joints act on it.
+/// Box2D. A movable body keeps its coordinates along locked axes, and its velocities along and
+/// about them are 0. A kinematic body keeps its velocities, which act on the bodies in contact: it
+/// is a conveyor. See docs/world.md for how contacts and joints act on these bodies.
 struct MotionLocks {
   bool linear_x = false, linear_y = false, linear_z = false;
   bool angular_x = false, angular_y = false, angular_z = false;
@@ -45,6 +46,8 @@ inline constexpr MotionLocks kFixedRotation{false, false, false, true, true, tru
 /// The body moves in a plane of constant z, as the bodies of a game in two dimensions: linear_z,
 /// angular_x and angular_y are locked.
 inline constexpr MotionLocks kPlanarMotion{false, false, true, true, true, false};
+/// The body keeps its pose, as a conveyor belt or a turntable: all axes are locked.
+inline constexpr MotionLocks kFixedPose{true, true, true, true, true, true};
 
 /// Definition of a rigid body in a scene. SI units.
 struct BodyDef {
@@ -76,8 +79,8 @@ struct BodyDef {
   /// A sensor has contacts and contact events, but the contacts are not resolved and wake no body.
   /// Contacts of contact generators are resolved.
   bool sensor = false;
-  /// Axes along or about which the body does not move; velocities along or about them become 0.
-  /// Ignored for mass 0. Solver::soft_step only.
+  /// Axes along or about which the body does not move; velocities of a movable body along or about
+  /// them become 0. Ignored for an immovable body. Solver::soft_step only.
   MotionLocks motion_locks;
   std::uint64_t user_data = 0;  ///< application data without effect
   friend bool operator==(const BodyDef&, const BodyDef&) = default;

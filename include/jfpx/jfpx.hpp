@@ -5,9 +5,11 @@
 #include <jfpx/build.hpp>
 #include <jfpx/character.hpp>
 #include <jfpx/collide.hpp>
+#include <jfpx/communicator.hpp>
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/contact_list.hpp>
 #include <jfpx/cost_model.hpp>
+#include <jfpx/debug_draw.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/heightfield.hpp>

@@ -20,8 +20,9 @@ using RecordableForce =
     std::variant<Gravity, Drag, Spring, Bungee, Aero, AeroControl, Buoyancy, Explosion>;
 
 /// A World whose changes are recorded in the file of RecordingWriter. It has the functions of World
-/// that a file can store, with the same results and exceptions; `jfpx replay` repeats the run. Not
-/// thread-safe, except for reading world().
+/// that a file can store, with the same results and exceptions; `jfpx replay` repeats the run. With
+/// several ranks, whose functions are collective, rank 0 writes the file; a FileError is thrown on
+/// rank 0 only, so the program must then end. Not thread-safe, except for reading world().
 class JFPX_API RecordedWorld {
  public:
   /// @throws as World and RecordingWriter
@@ -39,6 +40,7 @@ class JFPX_API RecordedWorld {
 
   BodyId add(const BodyDef& body);
   void remove(BodyId id);
+  void replace(BodyId id, const BodyDef& body);
   void set_state(BodyId id, const BodyState& state);
   void wake(BodyId id);
 

@@ -68,5 +68,17 @@ class JFPX_API TrajectoryWriter {
   std::unique_ptr<Format> format_;
 };
 
+/// Writes the states of all bodies of a world to a file in NumPy's format (.npy): an array of
+/// records, in the order of World::bodies(), which `numpy.load(path, mmap_mode="r")` maps into
+/// memory. The fields of a record are index and generation (BodyId, unsigned 32 bits), position
+/// [m], orientation (w, x, y, z), velocity [m/s] and angular_velocity [rad/s] in world axes, in the
+/// precision of the library. Equal states give equal bytes. The file appears under its name when it
+/// is complete; until then, the data are in NAME.part in the same folder.
+///
+/// With several ranks, all call the function, with a path on a file system that they share. Each
+/// rank writes a share of the rows, and none collects the states of all bodies.
+/// @throws FileError, for example if the disk is full, on all ranks; DeviceError, OutOfMemory
+JFPX_API void write_states(const World& world, const std::string& path);
+
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -1,6 +1,7 @@
 /// The native engine: a world of rigid bodies with its own step (thesis 4.3).
 #pragma once
 
+#include <jfpx/communicator.hpp>
 #include <jfpx/contact_generator.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
@@ -44,6 +45,9 @@ struct WorldSettings {
   /// [m/s], > 0: the least approach speed of World::hit_events(), for example 1. If it is infinite,
   /// there are no hit events. Has no effect on the motion.
   Real hit_speed = std::numeric_limits<Real>::infinity();
+  /// The ranks that hold the world together (docs/ranks.md); null: the world is of this process
+  /// alone. With several ranks, the solver is Solver::soft_step and the backend the CPU.
+  std::shared_ptr<Communicator> communicator = nullptr;
 };
 
 /// One contact point of two bodies. Boxes in contact along a face have several points; compounds
@@ -168,6 +172,16 @@ class JFPX_API World {
   /// Removes a body and wakes the bodies in contact with it.
   /// @throws InvalidArgument for an id of no living body of this world
   void remove(BodyId id);
+  /// The definition of a body in its current state: add() of another world makes the same body.
+  /// @throws InvalidArgument for an unknown id
+  BodyDef definition(BodyId id) const;
+  /// Gives a body another definition: another shape, a mass of 0 instead of a mass, or any other
+  /// fields of BodyDef. Its id, its joints and its ignored pairs remain; its contacts end, as by
+  /// remove(). Wakes the body and the bodies in contact with it. A world on a GPU is copied to the
+  /// host, and back in the next step.
+  /// @throws InvalidArgument for an unknown id, or if a joint would have no movable body;
+  ///   InvalidScene if the definition is invalid. The world is then unchanged.
+  void replace(BodyId id, const BodyDef& body);
 
   /// Advances the world by the dt of the scene. Scene::solver selects the stages: forces, detection
   /// and substeps, or forces, integration, detection and resolution. Physics throws no exceptions:
@@ -232,14 +246,14 @@ class JFPX_API World {
   Real angular_damping(BodyId id) const;
   void set_damping(BodyId id, Real linear, Real angular);
   /// [kg], > 0. The inertia becomes that of the solid shape with this mass, unless it was given by
-  /// BodyDef::inertia or set_inertia(). A mass of 0 cannot be changed or set.
+  /// BodyDef::inertia or set_inertia(). A mass of 0 cannot be changed or set: see replace().
   void set_mass(BodyId id, Real mass);
   /// [kg m^2], as BodyDef::inertia; absent: that of the solid shape. Has no effect on a body of
   /// mass 0.
   void set_inertia(BodyId id, const std::optional<Mat3>& inertia);
-  /// BodyDef::motion_locks. A change wakes the body, and velocities along or about the locked axes
-  /// become 0. Has no effect on a body of mass 0. @throws InvalidArgument also if the solver is
-  /// worst_first
+  /// BodyDef::motion_locks. A change wakes the body, and velocities of a movable body along or
+  /// about the locked axes become 0. Has no effect on an immovable body. @throws InvalidArgument
+  /// also if the solver is worst_first
   MotionLocks motion_locks(BodyId id) const;
   void set_motion_locks(BodyId id, const MotionLocks& locks);
   std::uint64_t user_data(BodyId id) const;

@@ -54,7 +54,7 @@ class Jfpx(ConanFile):
         toolchain.cache_variables["JFPX_CUDA"] = "ON" if self.options.cuda else "OFF"
         toolchain.cache_variables["JFPX_BULLET"] = "ON" if self.options.bullet else "OFF"
         toolchain.cache_variables["JFPX_PRECISIONS"] = str(self.options.bullet) if self.options.bullet else "both"
-        for switch in ("JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS"):
+        for switch in ("JFPX_MPI", "JFPX_VIEWER", "JFPX_TOOL", "JFPX_EXAMPLES", "JFPX_TESTS"):
             toolchain.cache_variables[switch] = "OFF"
         toolchain.generate()
 

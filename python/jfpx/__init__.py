@@ -22,7 +22,7 @@ from ._recording import Recording, RecordingWriter, TrajectoryWriter
 from ._scene import Scene, scene_names
 from ._view import View
 from ._world import (BEGIN, END, STAY, BodyDistance, BodyDistances, ContactEvents, ContactForces,
-                     HitEvents, RayHit, RayHits, ShapeHit, ShapeHits, StepReport, World,
+                     DebugLines, HitEvents, RayHit, RayHits, ShapeHit, ShapeHits, StepReport, World,
                      WorldContacts)
 
 __version__ = "0.3.0"
@@ -30,8 +30,8 @@ __version__ = "0.3.0"
 __all__ = [
     "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyDistance", "BodyDistances", "BodyId",
     "BodyState", "Bungee", "Buoyancy", "CharacterHit", "CharacterMove", "CharacterSettings", "CharacterState",
-    "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts", "DeviceError",
-    "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError", "FixedJoint", "ForceContext", "Gravity",
+    "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts", "DebugLines",
+    "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError", "FixedJoint", "ForceContext", "Gravity",
     "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene", "InvalidSnapshot", "JointId", "JointState",
     "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows", "PeriodicContacts", "PeriodicNearest",
     "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording", "RecordingWriter", "Rows", "STAY",

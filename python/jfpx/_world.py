@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import functools
+import json
 import math
+import os
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _arrays, _device
+from . import _arrays, _device, mpi
 from ._character import CharacterHit, CharacterMove, CharacterSettings, CharacterState
 from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
@@ -343,6 +345,21 @@ class BodyDistances(NamedTuple):
     normal: np.ndarray
 
 
+class DebugLines(NamedTuple):
+    """L lines of World.debug_lines().
+
+    Attributes
+    ----------
+    lines : array (L, 2, 3)
+        [m], both ends of each line, in the dtype of the world.
+    colors : array (L, 3) of uint8
+        Red, green and blue.
+    """
+
+    lines: np.ndarray
+    colors: np.ndarray
+
+
 class World:
     """Rigid bodies and their motion. The states after a step are the same to the last bit for every
     backend, algorithm and number of threads.
@@ -374,6 +391,14 @@ class World:
     hit_speed : float
         [m/s], > 0: the least approach speed of hit_events(), for example 1. Infinity: there are no
         hit events.
+    communicator : mpi4py.MPI.Intracomm, jfpx.mpi.Communicator or a similar object, optional
+        The processes that hold the world together, each with a World of the same scene. All of them
+        make the same calls of it in the same order, with the same arguments, also those that only
+        read, and get the same results as without a communicator, to the last bit. The solver is
+        soft_step and the backend the CPU. An exception on one rank leaves the others waiting: `python
+        -m mpi4py program.py` then ends all of them. Of a communicator of mpi4py, a duplicate is
+        used, which close() frees on all ranks; see jfpx.mpi for other objects. A copy of the world,
+        by pickle or copy.deepcopy(), has no communicator.
 
     Raises
     ------
@@ -381,7 +406,8 @@ class World:
         A field of `scene` is unknown or out of range.
     InvalidArgument
         An option is out of its range, there is no scene of this name, `scene` has another type, or
-        `dtype` is not that of the scene.
+        `dtype` is not that of the scene. With several ranks, the backend is "cuda" or the solver
+        worst_first. `communicator` is of another type.
     BackendUnavailable
         The backend was requested by name and cannot be used.
     OutOfMemory, DeviceError
@@ -389,7 +415,7 @@ class World:
 
     def __init__(self, scene: Scene | dict[str, Any] | str, *, dtype: Any = None,
                  backend: str = "auto", algorithm: str = "auto", threads: int = 1,
-                 device: int = 0, hit_speed: float = math.inf) -> None:
+                 device: int = 0, hit_speed: float = math.inf, communicator: Any = None) -> None:
         if dtype is not None:
             _arrays.precision_of(dtype)
         if isinstance(scene, str):
@@ -402,9 +428,11 @@ class World:
         elif dtype is not None and np.dtype(dtype) != scene.dtype:
             raise InvalidArgument(f"dtype is {dtype}; that of the scene is {scene.dtype}")
         self._dtype = scene.dtype
-        self._core = _arrays.precision_of(self._dtype).World(
-            scene._scene, *_arrays.options(backend, algorithm, threads, device),
-            _arrays.number(hit_speed, "hit_speed"))
+        options = _arrays.options(backend, algorithm, threads, device)
+        hit_speed = _arrays.number(hit_speed, "hit_speed")
+        ranks = mpi.communicator_of(communicator)
+        self._core = _arrays.precision_of(self._dtype).World(scene._scene, *options, hit_speed, *ranks)
+        self._duplicate = None if ranks[0] is communicator else ranks[0]  # is freed with the world
         self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device,
                          "hit_speed": hit_speed}
         self._device = device
@@ -413,8 +441,8 @@ class World:
 
     def __reduce__(self) -> Any:
         """The scene, the options and a snapshot: pickle and copy.deepcopy() make a world that
-        continues with the same bits. A world with functions as forces cannot be copied: the copy
-        raises InvalidSnapshot."""
+        continues with the same bits, without a communicator. A world with functions as forces cannot
+        be copied: the copy raises InvalidSnapshot."""
         scene = self.scene
         try:
             scene.to_json()
@@ -431,7 +459,8 @@ class World:
         Raises
         ------
         Exception
-            An exception of a force that is a function. It undoes the step.
+            An exception of a force that is a function. It undoes the step. With several ranks, also
+            one of the communicator, which leaves them in different states.
         OutOfMemory, DeviceError
             The state is then as before the step.
         ConcurrentUse, Closed
@@ -591,8 +620,10 @@ class World:
 
     def close(self) -> None:
         """Frees the world now. Later calls raise Closed. Also at the end of a `with` statement.
-        Raises ConcurrentUse during a step."""
+        Raises ConcurrentUse during a step. With several ranks, all of them close the world."""
         self._core.close()
+        if self._duplicate is not None:
+            self._duplicate.close()
 
     def __enter__(self) -> World:
         return self
@@ -652,12 +683,39 @@ class World:
         next step. Raises InvalidArgument for an unknown body."""
         self._core.remove(_arrays.body(body))
 
+    def definition(self, body: BodyId) -> dict[str, Any]:
+        """Returns all fields of a body in its current state, in the form that add() and replace()
+        take. Raises InvalidArgument for an unknown body."""
+        return dict(json.loads(self._core.definition(_arrays.body(body)).to_json())["bodies"][0])
+
+    def replace(self, body: BodyId, definition: dict[str, Any]) -> None:
+        """Gives a body another definition, with the fields of a body in a Scene: another shape, a
+        mass of 0 instead of a mass, or any other fields. Its id, its joints and its ignored pairs
+        remain; its contacts end, and contacts() has none until the next step. Wakes the body and
+        the bodies in contact with it::
+
+            fields = world.definition(body)
+            world.replace(body, fields | {"shape": {"type": "sphere", "radius": 2}})
+
+        Raises InvalidArgument for an unknown body, or if a joint would have no movable body, and
+        InvalidScene for a field that is unknown or out of range; the world is then unchanged."""
+        scene = Scene({"bodies": [definition]}, dtype=self._dtype)
+        self._core.replace(_arrays.body(body), scene._scene)
+
     def states(self) -> States:
         """States of all bodies as new arrays (N, 3) and (N, 4) of the dtype of the world, in the
         order of `bodies`. Raises OutOfMemory, DeviceError."""
         states = States.empty(len(self), self._dtype)
         self._core.write_states(*states)
         return states
+
+    def save_states(self, path: str | os.PathLike[str]) -> None:
+        """Writes the states to a file for ``numpy.load(path, mmap_mode="r")``: an array (N,) of
+        records in the order of `bodies`, with the fields index and generation (BodyId), position
+        [m], orientation (w, x, y, z), velocity [m/s] and angular_velocity [rad/s]. Several ranks
+        write one file together, on a file system that they share, without collecting the states.
+        The path has the complete file or is unchanged. Raises FileError, DeviceError, OutOfMemory."""
+        self._core.save_states(_arrays.path(path))
 
     def device_states(self) -> States:
         """States in the memory of the GPU that makes the steps, without a copy: other libraries
@@ -845,7 +903,8 @@ class World:
                          angular: Sequence[bool] = (False, False, False)) -> None:
         """Locks axes of motion of a body: it moves neither along axes of `linear` nor about axes of
         `angular`, each x, y and z of the world, and its velocities along and about them become 0. A
-        change wakes the body; has no effect on one of mass 0. A character that does not fall over
+        kinematic body keeps its velocities, which act on the bodies that touch it: a conveyor. A
+        change wakes the body; has no effect on an immovable body. A character that does not fall over
         has ``angular=(True, True, True)``, a body of a game in two dimensions
         ``linear=(False, False, True), angular=(True, True, False)``. Raises InvalidArgument for an
         unknown body, and if the solver is worst_first."""
@@ -1342,6 +1401,52 @@ class World:
                                            _arrays.triple(centre, "centre"),
                                            _arrays.triple(orientation, "orientation", 4))
         return [BodyId(*body) for body in found]
+
+    def debug_lines(self, *, shapes: bool = True, joints: bool = True, contacts: bool = False,
+                    contact_forces: bool = False, velocities: bool = False, axes: bool = False,
+                    axis_length: float = 0.25, force_length: float = 0.01,
+                    wall_size: float = 20.0, circle_points: int = 24,
+                    region: tuple[Vector, Vector] | None = None,
+                    filter: Callable[[BodyId], bool] | None = None) -> DebugLines:
+        """The world as lines, for plots and renderers. Bodies come in the order of `bodies`, then
+        joints and contacts. Colors show which bodies are awake, asleep, immovable, kinematic or sensors.
+
+        Parameters
+        ----------
+        shapes, joints, contacts, contact_forces, velocities, axes : bool
+            What is drawn: surfaces of bodies; lines from the bodies to the anchors of joints;
+            points and normals of contacts(); contact_forces(); velocities, as long as the motion in
+            0.1 s; axes of bodies.
+        axis_length : float
+            [m], of axes of joints and bodies and of normals, > 0.
+        force_length : float
+            [m/N], of contact forces.
+        wall_size : float
+            [m], > 0: side of the square that is drawn of a half-space or plane.
+        circle_points : int
+            Of a circle of a round solid, 4 to 1024.
+        region : two vectors, optional
+            [m], the lower and the upper corner of a box: only bodies that overlap it, their joints,
+            and contacts in it.
+        filter : function, optional
+            Called with the BodyId of a body, which is drawn if the result is true. It must not
+            change the world.
+
+        Raises
+        ------
+        InvalidArgument
+            A number is out of its range, or the region is empty.
+        OutOfMemory, DeviceError, and exceptions of `filter`
+        """
+        box = None if region is None else (_arrays.triple(region[0], "region[0]"),
+                                           _arrays.triple(region[1], "region[1]"))
+        shown = [bool(x) for x in (shapes, joints, contacts, contact_forces, velocities, axes)]
+        lengths = tuple(_arrays.number(value, name) for value, name in (
+            (axis_length, "axis_length"), (force_length, "force_length"), (wall_size, "wall_size")))
+        lines, colors = self._core.debug_lines(
+            shown, lengths, _arrays.count(circle_points, "circle_points", 4, 1024), box,
+            _of_body(filter))
+        return DebugLines(lines.reshape(-1, 2, 3), colors)
 
     def view(self, *, height: int = 480) -> View:
         """A picture of the bodies in 3D for notebooks, which View.update() and View.follow() bring up

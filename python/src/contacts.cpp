@@ -215,12 +215,6 @@ void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
   }
 }
 
-/// Calls `filter`, if there is one, for each body that is hit.
-BodyFilter to_filter(const nb::object& filter) {
-  if (filter.is_none()) return {};
-  return [&filter](BodyId id) { return nb::cast<bool>(filter(to_tuple(id))); };
-}
-
 /// @param numbers radius, half_height, max_slope, step_height, skin
 nb::tuple move_one(const PythonWorld& self, const std::array<double, 5>& numbers, const Triple& up,
                    const Triple& position, const Triple& velocity, int ground,
@@ -261,6 +255,11 @@ std::vector<IdTuple> to_tuples(const std::vector<BodyId>& ids) {
 }
 
 }  // namespace
+
+BodyFilter to_filter(const nb::object& filter) {
+  if (filter.is_none()) return {};
+  return [&filter](BodyId id) { return nb::cast<bool>(filter(to_tuple(id))); };
+}
 
 void bind_contacts(nb::class_<PythonWorld>& world) {
   world.def("contact_count", [](const PythonWorld& self) { return self.get().contacts().size(); })

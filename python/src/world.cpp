@@ -64,6 +64,14 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
              return ids;
            })
       .def("remove", [](PythonWorld& self, IdTuple id) { self.get().remove(to_id(id)); })
+      .def("definition",
+           [](const PythonWorld& self, IdTuple id) {
+             Scene scene;
+             scene.bodies.push_back(self.get().definition(to_id(id)));
+             return scene;
+           })
+      .def("replace", [](PythonWorld& self, IdTuple id,
+                         const Scene& scene) { self.get().replace(to_id(id), scene.bodies.at(0)); })
       .def("contains",
            [](const PythonWorld& self, IdTuple id) { return self.get().contains(to_id(id)); })
       .def("body_at", [](const PythonWorld& self,
@@ -268,10 +276,12 @@ void PythonWorld::free() noexcept {
   }
   world_.reset();
   functions_.clear();
+  communicator_.reset();
 }
 
 int PythonWorld::traverse(visitproc visit, void* arg) const {
   for (const auto& [id, function] : functions_) Py_VISIT(function.ptr());
+  Py_VISIT(communicator_.ptr());
   return 0;
 }
 
@@ -281,18 +291,23 @@ void bind_world(nb::module_& module) {
       .def(
           "__init__",
           [](PythonWorld* self, const Scene& scene, const std::string& backend,
-             const std::string& algorithm, unsigned threads, int device, double hit_speed) {
+             const std::string& algorithm, unsigned threads, int device, double hit_speed,
+             nb::object communicator, std::uint32_t rank, std::uint32_t size) {
             new (self)
-                PythonWorld(scene, world_settings(backend, algorithm, threads, device, hit_speed));
+                PythonWorld(scene, world_settings(backend, algorithm, threads, device, hit_speed),
+                            std::move(communicator), rank, size);
           },
           nb::arg("scene"), nb::arg("backend"), nb::arg("algorithm"), nb::arg("threads"),
-          nb::arg("device"), nb::arg("hit_speed"))
+          nb::arg("device"), nb::arg("hit_speed"), nb::arg("communicator").none(), nb::arg("rank"),
+          nb::arg("size"))
       .def("step", [](PythonWorld& self) { return to_python(self.step()); })
       .def("run", [](PythonWorld& self, std::uint64_t steps) { return to_python(self.run(steps)); })
       .def("close", &PythonWorld::close)
       .def("time", [](const PythonWorld& self) { return self.get().time(); })
       .def("steps", [](const PythonWorld& self) { return self.get().steps(); })
       .def("state_hash", [](const PythonWorld& self) { return self.get().state_hash(); })
+      .def("save_states",
+           [](const PythonWorld& self, const std::string& path) { write_states(self.get(), path); })
       .def("snapshot",
            [](const PythonWorld& self) {
              const Snapshot snapshot = self.get().snapshot();
@@ -309,6 +324,7 @@ void bind_world(nb::module_& module) {
   bind_forces(module, world);
   bind_joints(world);
   bind_contacts(world);
+  bind_drawing(world);
   bind_device_states(module, world);
 }
 

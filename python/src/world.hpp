@@ -4,6 +4,7 @@
 #include <jfpx/cuda/world.hpp>
 
 #include "python/src/bindings.hpp"
+#include "python/src/communicator.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <memory>
@@ -17,8 +18,17 @@ namespace python {
 /// and after close().
 class PythonWorld {
  public:
-  PythonWorld(const Scene& scene, const WorldSettings& settings)
-      : scene_(scene), world_(std::make_unique<World>(scene, settings)) {}
+  /// @param communicator an object such as jfpx.mpi.Communicator, or None
+  /// @param rank,size    its rank and size
+  PythonWorld(const Scene& scene, WorldSettings settings, nb::object communicator,
+              std::uint32_t rank, std::uint32_t size)
+      : communicator_(std::move(communicator)), scene_(scene) {
+    if (!communicator_.is_none()) {
+      settings.communicator =
+          std::make_shared<PythonCommunicator>(communicator_, rank, size, &in_use_);
+    }
+    world_ = std::make_unique<World>(scene, settings);
+  }
   ~PythonWorld() { free(); }
   PythonWorld(const PythonWorld&) = delete;
   PythonWorld& operator=(const PythonWorld&) = delete;
@@ -70,7 +80,7 @@ class PythonWorld {
   ForceId add_function(nb::object function);
   void remove_force(ForceId id);
 
-  /// Visits the functions, for the garbage collector.
+  /// Visits the functions and the communicator, for the garbage collector.
   int traverse(visitproc visit, void* arg) const;
 
  private:
@@ -83,9 +93,10 @@ class PythonWorld {
   }
 
   std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
+  nb::object communicator_;                                // likewise
+  std::atomic<bool> in_use_ = false;                       // outlives the communicator's calls
   Scene scene_;                                            ///< of the constructor
   std::unique_ptr<World> world_;
-  std::atomic<bool> in_use_ = false;
   std::uint64_t changes_ = 0;
   std::optional<int> reading_device_;  ///< has work that may read device_states()
 };
@@ -104,9 +115,13 @@ struct FunctionContext {
 /// A report as the tuple jfpx.StepReport, in the order of its fields.
 nb::tuple to_python(const StepReport& report);
 
+/// A filter that calls `filter`, which it refers to, for each body; none for None.
+BodyFilter to_filter(const nb::object& filter);
+
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
 void bind_joints(nb::class_<PythonWorld>& world);
 void bind_contacts(nb::class_<PythonWorld>& world);
+void bind_drawing(nb::class_<PythonWorld>& world);
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world);
 
 }  // namespace python

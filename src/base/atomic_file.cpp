@@ -17,15 +17,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// True if the path exists and is not a regular file, so that renaming a file to it would destroy
-/// it.
+/// The temporary file.
+fs::path part_of(fs::path target) {
+  if (!is_special(target)) target += ".part";
+  return target;
+}
+
+}  // namespace
+
 bool is_special(const fs::path& path) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   return fs::exists(status) && !fs::is_regular_file(status);
 }
 
-/// Target of a chain of symbolic links, which need not exist.
 fs::path follow_links(fs::path path) {
   constexpr int kMaxLinks = 40;  // the limit of Linux; links may form a cycle
   std::error_code ignored;
@@ -34,14 +39,6 @@ fs::path follow_links(fs::path path) {
   }
   return path;
 }
-
-/// The temporary file.
-fs::path part_of(fs::path target) {
-  if (!is_special(target)) target += ".part";
-  return target;
-}
-
-}  // namespace
 
 AtomicFile::AtomicFile(std::string path)
     : path_(std::move(path)),

@@ -11,6 +11,12 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
+/// True if the path exists and is not a regular file, so that renaming a file to it would destroy
+/// it.
+JFPX_API bool is_special(const std::filesystem::path& path);
+/// Target of a chain of symbolic links, which need not exist.
+JFPX_API std::filesystem::path follow_links(std::filesystem::path path);
+
 /// Writes to a temporary file beside its path and renames it in finish(), so that readers see
 /// either the complete file or none. The destructor removes an unfinished file. A symbolic link is
 /// kept, and its target is replaced. Devices and pipes can't be replaced and are written directly.

@@ -18,12 +18,12 @@ class SpinLock {
  public:
   void lock() noexcept {
     for (unsigned i = 0; held_.test_and_set(std::memory_order_acquire); ++i) {
-      constexpr unsigned kPolls = 256;
-      while (i < kPolls && held_.test(std::memory_order_relaxed)) {
+      constexpr unsigned kMostPolls = 256;
+      while (i < kMostPolls && held_.test(std::memory_order_relaxed)) {
         pause();
         ++i;
       }
-      if (i >= kPolls) std::this_thread::yield();
+      if (i >= kMostPolls) std::this_thread::yield();
     }
   }
   void unlock() noexcept { held_.clear(std::memory_order_release); }

@@ -56,14 +56,15 @@ SphereColliderOptions collider_options(const RunOptions& options) {
   SphereColliderOptions collider;
   collider.backend = options.backend;
   collider.threads = options.threads;
-  if (options.backend == Backend::automatic) collider.costs = costs_of_this_machine(options.quiet);
+  if (options.backend == Backend::automatic)
+    collider.costs = costs_of_this_machine(options.quiet || !writes_output(options));
   return collider;
 }
 
 WorldSettings world_settings(const RunOptions& options) {
   SphereColliderOptions collider = collider_options(options);
   collider.threads = 1;
-  return {.collider = collider, .threads = options.threads};
+  return {.collider = collider, .threads = options.threads, .communicator = options.communicator};
 }
 
 std::unique_ptr<Engine> make_engine(EngineKind kind, const Scene& scene,

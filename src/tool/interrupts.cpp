@@ -1,7 +1,11 @@
 /// Conversion of SIGHUP, SIGINT and SIGTERM to an exception.
 #include "src/tool/interrupts.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdlib>
+#include <span>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -59,8 +63,14 @@ void end_by_signal(int signal) {
 
 bool Interrupts::requested() { return g_signal != 0; }
 
-void Interrupts::check() {
-  if (requested()) throw Interrupted{g_signal};
+void Interrupts::check(Communicator* ranks) {
+  int signal = g_signal;
+  if (ranks != nullptr) {
+    std::vector<int> signals(ranks->size());
+    ranks->gather(std::as_bytes(std::span(&signal, 1)), std::as_writable_bytes(std::span(signals)));
+    signal = *std::ranges::max_element(signals);
+  }
+  if (signal != 0) throw Interrupted{signal};
 }
 
 }  // namespace tool

@@ -1,7 +1,7 @@
 /// Conversion of SIGHUP, SIGINT and SIGTERM to an exception, so that a run leaves no partial files.
 #pragma once
 
-#include <jfpx/config.hpp>
+#include <jfpx/communicator.hpp>
 
 #include <array>
 #include <csignal>
@@ -29,8 +29,10 @@ class Interrupts {
 
   /// Whether a signal has arrived.
   static bool requested();
+  /// @param ranks those that run together, of which each calls this; null: this process alone. A
+  ///   signal that has arrived at any of them interrupts all.
   /// @throws Interrupted
-  static void check();
+  static void check(Communicator* ranks = nullptr);
 
  private:
 #if defined(_WIN32)

@@ -1,12 +1,13 @@
 /// The jfpx command.
-#include <jfpx/error.hpp>
 #include <jfpx/thesis/worst_first.hpp>
 
 #include "src/base/system.hpp"
 #include "src/tool/commands.hpp"
+#include "src/tool/failure.hpp"
 #include "src/tool/interrupts.hpp"
 #include "src/tool/options.hpp"
 #include "src/tool/precision.hpp"
+#include "src/tool/ranks.hpp"
 
 #include <fmt/format.h>
 
@@ -14,8 +15,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <exception>
 #include <iterator>
-#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -74,6 +75,7 @@ int run(const std::vector<std::string>& given) {
       "Examples:\n"
       "  jfpx compare boxes-and-balls --spheres 448 --steps 600\n"
       "  jfpx run pile --spheres 2048 --steps 120 --hash\n"
+      "  mpirun -n 8 jfpx run pile --spheres 20000 --hash\n"
       "  jfpx scenes gas --spheres 100 --export > gas.json && jfpx run gas.json\n"
       "\n"
       "Exit status: 0 success; 1 a check failed (mismatch, divergence); 2 invalid usage or "
@@ -90,6 +92,11 @@ int run(const std::vector<std::string>& given) {
   tool::add_scenes_command(app, status);
   tool::add_devices_command(app, status);
   tool::add_calibrate_command(app, status);
+  for (CLI::App* command : app.get_subcommands({})) {
+    const std::string& name = command->get_name();
+    if (name == "run" || name == "preload") continue;  // preload: the program may use MPI
+    command->preparse_callback([name](std::size_t) { tool::require_one_process(name); });
+  }
   std::vector<std::string> arguments = separate_program(app, given);
   tool::switch_precision_if_requested(arguments);
   std::ranges::reverse(arguments);
@@ -109,16 +116,7 @@ int main(int argc, char** argv) {
     return finish_output(run(start_program(argc, argv)));
   } catch (const tool::Interrupted& interrupted) {
     tool::end_by_signal(interrupted.signal);
-  } catch (const BackendUnavailable& error) {
-    fmt::print(stderr, "jfpx: {}\n", error.what());
-    return tool::kBackendUnavailable;
-  } catch (const DeviceError& error) {
-    fmt::print(stderr, "jfpx: {}\n", error.what());
-    return tool::kBackendUnavailable;
-  } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "jfpx: out of memory\n");
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "jfpx: {}\n", error.what());
+  } catch (...) {
+    return tool::report_failure(std::current_exception());
   }
-  return tool::kBadUsage;
 }

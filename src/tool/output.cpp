@@ -52,15 +52,18 @@ std::string Table::text() const {
   return result;
 }
 
-Progress::Progress(std::string label, std::uint64_t total, bool quiet)
-    : label_(std::move(label)), total_(total), shown_(!quiet && is_terminal(stderr)) {}
+Progress::Progress(std::string label, std::uint64_t total, bool quiet, Communicator* ranks)
+    : ranks_(ranks),
+      label_(std::move(label)),
+      total_(total),
+      shown_(!quiet && is_terminal(stderr) && (ranks == nullptr || ranks->rank() == 0)) {}
 
 Progress::~Progress() {
   if (shown_ && percent_ >= 0) fmt::print(stderr, "\r{:79}\r", "");
 }
 
 void Progress::advance_to(std::uint64_t done) {
-  Interrupts::check();
+  Interrupts::check(ranks_);
   if (!shown_ || total_ == 0) return;
   const int percent = static_cast<int>(done * 100 / total_);
   if (percent == percent_) return;

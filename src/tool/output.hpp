@@ -44,10 +44,11 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// Progress bar on stderr, shown only if stderr is a terminal. Ctrl-C ends the run.
+/// Progress bar on stderr, shown only if stderr is a terminal, and by rank 0. Ctrl-C ends the run.
 class Progress {
  public:
-  Progress(std::string label, std::uint64_t total, bool quiet);
+  /// @param ranks those that run together, of which each makes the same calls; null: one process
+  Progress(std::string label, std::uint64_t total, bool quiet, Communicator* ranks = nullptr);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -56,6 +57,7 @@ class Progress {
 
  private:
   Interrupts interrupts_;
+  Communicator* ranks_;
   std::string label_;
   std::uint64_t total_;
   int percent_ = -1;

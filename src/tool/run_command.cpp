@@ -1,6 +1,7 @@
-/// jfpx run: runs a scene with one engine.
+/// jfpx run: runs a scene with one engine, in one process or in several that hold one world.
 #include <jfpx/error.hpp>
 #include <jfpx/recording.hpp>
+#include <jfpx/snapshot.hpp>
 #include <jfpx/trajectory.hpp>
 
 #include "src/base/atomic_file.hpp"
@@ -10,6 +11,7 @@
 #include "src/tool/options.hpp"
 #include "src/tool/output.hpp"
 #include "src/tool/precision.hpp"
+#include "src/tool/ranks.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -18,6 +20,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace jfpx {
@@ -28,10 +31,13 @@ namespace {
 struct CommandOptions {
   RunOptions run;
   std::string engine = "native";
-  std::string input;                   ///< path of an input script
-  std::string snapshot;                ///< path
-  std::string trajectory;              ///< path
-  std::uint64_t trajectory_every = 1;  ///< [steps], > 0
+  std::string input;                                        ///< path of an input script
+  std::string snapshot;                                     ///< path
+  std::string from;                                         ///< path of a snapshot
+  std::pair<std::uint64_t, std::string> checkpoint{0, ""};  ///< [steps], path; 0: none
+  std::string states;                                       ///< path
+  std::string trajectory;                                   ///< path
+  std::uint64_t trajectory_every = 1;                       ///< [steps], > 0
 };
 
 struct Totals {
@@ -39,6 +45,10 @@ struct Totals {
   StageTimes times;
   std::map<std::string, std::uint64_t> choices;  ///< number of steps by Engine::choice()
 };
+
+std::uint32_t ranks_of(const CommandOptions& options) {
+  return options.run.communicator == nullptr ? 1 : options.run.communicator->size();
+}
 
 std::string csv_row(std::uint64_t step, const Engine& engine) {
   const StageTimes t = engine.times();
@@ -59,13 +69,14 @@ std::string summary(const CommandOptions& options, const Scene& scene, const Eng
   for (const auto& [choice, count] : totals.choices) choices.add({choice, std::to_string(count)});
   const StepMeasures m = engine.measures();
   return fmt::format(
-      "{}: {} bodies, {} steps of {} s, engine {}{}{}, backend {}\n"
+      "{}: {} bodies, {} steps of {} s, engine {}{}{}, backend {}{}\n"
       "contacts at the end {}, awake {}\n"
       "penetration at the end {:.3g} m deepest, {:.3g} m mean; largest speed {:.3g} m/s\n\n{}\n{}",
       scene.name, engine.states().size(), options.run.steps, text(scene.dt), options.engine,
       engine.resolver().empty() ? "" : ", resolver ", engine.resolver(), engine.backend(),
-      engine.contacts(), engine.awake(), m.deepest_penetration, m.mean_penetration, m.largest_speed,
-      table.text(), choices.text());
+      ranks_of(options) == 1 ? "" : fmt::format(", {} ranks", ranks_of(options)), engine.contacts(),
+      engine.awake(), m.deepest_penetration, m.mean_penetration, m.largest_speed, table.text(),
+      choices.text());
 }
 
 nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene& scene,
@@ -79,6 +90,7 @@ nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene&
           {"engine", options.engine},
           {"resolver", resolver},
           {"backend", engine.backend()},
+          {"ranks", ranks_of(options)},
           {"precision", kPrecision},
           {"contacts", engine.contacts()},
           {"contacts_total", totals.contacts},
@@ -105,66 +117,139 @@ std::unique_ptr<Engine> start(const CommandOptions& options, Scene* scene) {
   if (!options.run.record.empty()) {
     throw InvalidArgument("--record requires a scene; a demo is repeated with --input");
   }
-  if (!options.snapshot.empty()) {
-    throw InvalidArgument("--snapshot requires a scene; the controls of a demo are not in it");
+  for (const auto& [name, path] :
+       {std::pair{"--snapshot", &options.snapshot}, std::pair{"--from", &options.from},
+        std::pair{"--checkpoint", &options.checkpoint.second}}) {
+    if (path->empty()) continue;
+    throw InvalidArgument(
+        fmt::format("{} requires a scene; the controls of a demo are not in snapshots", name));
   }
-  if (!options.trajectory.empty()) {
-    throw InvalidArgument("--trajectory requires a scene; the bodies of a demo change");
+  for (const auto& [name, path] :
+       {std::pair{"--trajectory", &options.trajectory}, std::pair{"--states", &options.states}}) {
+    if (path->empty()) continue;
+    throw InvalidArgument(fmt::format("{} requires a scene; the bodies of a demo change", name));
   }
   return make_demo_engine(options.run, options.input, scene);
 }
 
+/// Rejects what only one process can run.
+void check_ranks(const CommandOptions& options) {
+  if (options.run.communicator == nullptr) return;
+  if (options.engine != to_string(EngineKind::native)) {
+    throw InvalidArgument(
+        fmt::format("several ranks require --engine native; engine is {}", options.engine));
+  }
+  if (!options.input.empty() || is_only_a_demo(options.run.scene)) {
+    throw InvalidArgument("several ranks require a scene; a demo runs as one process");
+  }
+}
+
+/// Writes the state of the world to a file, as rank 0.
+void write_snapshot(const CommandOptions& options, const std::string& path, const World& world) {
+  const Snapshot snapshot = world.snapshot();
+  if (writes_output(options.run)) save_snapshot(snapshot, path);
+}
+
+/// Continues from the snapshot of --from. @return the number of its steps
+std::uint64_t restore(const CommandOptions& options, const Scene& scene, World* world) {
+  if (options.from.empty()) return 0;
+  world->restore(load_snapshot(options.from));
+  if (world->bodies().size() != scene.bodies.size()) {
+    throw InvalidArgument(fmt::format(
+        "--from: {} has {} bodies, and the scene {}; it must be a snapshot of a run of the scene",
+        options.from, world->bodies().size(), scene.bodies.size()));
+  }
+  if (world->steps() > options.run.steps) {
+    throw InvalidArgument(fmt::format("--from: {} was written after step {}; --steps is {}",
+                                      options.from, world->steps(), options.run.steps));
+  }
+  return world->steps();
+}
+
+/// Reports failures on stderr. All ranks have the same trouble, and each its own device.
+/// @return the exit status
+int report_trouble_of_rank(const CommandOptions& options, const Engine& engine) {
+  if (writes_output(options.run)) return report_trouble(engine.device_failure(), engine.trouble());
+  if (!engine.device_failure().empty()) {
+    report_trouble(
+        fmt::format("rank {}: {}", options.run.communicator->rank(), engine.device_failure()), {});
+  }
+  return engine.trouble().empty() ? kSuccess : kCheckFailed;
+}
+
+/// All ranks call the same functions of the engine, which may communicate; rank 0 writes.
 int run(const CommandOptions& options) {
   check_stdout(options.run);
+  check_ranks(options);
   Scene scene;
   const auto engine = start(options, &scene);
-  OutputFile csv(options.run.csv), json(options.run.json);
+  const std::uint64_t first = restore(options, scene, engine->world());
+  const auto& [checkpoint_every, checkpoint_path] = options.checkpoint;
+  const bool writes = writes_output(options.run);
+  const bool records = !options.run.record.empty(), has_csv = !options.run.csv.empty();
+  OutputFile csv(writes ? options.run.csv : ""), json(writes ? options.run.json : "");
   std::optional<RecordingWriter> recording;
-  if (!options.run.record.empty()) {
+  if (writes && records) {
     recording.emplace(options.run.record,
                       RecordingHeader{.engine = options.engine,
                                       .backend = std::string(to_string(options.run.backend)),
                                       .scene = scene});
   }
   std::optional<TrajectoryWriter> trajectory;
+  const auto append_frame = [&](std::uint64_t step) {
+    const std::vector<BodyState> states = engine->states();
+    if (trajectory) trajectory->append(scene, step, states);
+  };
   if (!options.trajectory.empty()) {
-    trajectory.emplace(options.trajectory);
-    trajectory->append(scene, 0, engine->states());
+    if (writes) trajectory.emplace(options.trajectory);
+    append_frame(first);
   }
+  // Fails before the run if the file cannot be written.
+  if (writes && !options.states.empty()) AtomicFile{options.states};
   std::optional<AtomicFile> snapshot;
-  if (!options.snapshot.empty()) snapshot.emplace(options.snapshot);
+  if (writes && !options.snapshot.empty()) snapshot.emplace(options.snapshot);
   csv.write(
       "step,contacts,awake,integrate_ms,broad_ms,detect_ms,solve_ms,total_ms,"
       "deepest_penetration,mean_penetration,largest_speed\n");
   Totals totals;
   {
-    Progress progress(scene.name, options.run.steps, options.run.quiet);
-    for (std::uint64_t step = 1; step <= options.run.steps; ++step) {
+    Progress progress(scene.name, options.run.steps, options.run.quiet,
+                      options.run.communicator.get());
+    for (std::uint64_t step = first + 1; step <= options.run.steps; ++step) {
       engine->step();
       totals.times += engine->times();
       totals.contacts += engine->contacts();
       ++totals.choices[engine->choice()];
-      if (csv) csv.write(csv_row(step, *engine));
-      if (recording) recording->append(engine->states());
-      if (trajectory && step % options.trajectory_every == 0) {
-        trajectory->append(scene, step, engine->states());
+      if (has_csv) csv.write(csv_row(step, *engine));
+      if (records) {
+        const std::vector<BodyState> states = engine->states();
+        if (recording) recording->append(states);
+      }
+      if (!options.trajectory.empty() && step % options.trajectory_every == 0) append_frame(step);
+      if (checkpoint_every > 0 && step % checkpoint_every == 0) {
+        write_snapshot(options, checkpoint_path, *engine->world());
       }
       progress.advance_to(step);
     }
   }
   if (recording) recording->finish();
   if (trajectory) trajectory->finish();
-  if (snapshot) {
+  if (!options.states.empty()) write_states(*engine->world(), options.states);
+  if (!options.snapshot.empty()) {
     const std::vector<std::byte> bytes = engine->world()->snapshot().bytes;
-    snapshot->write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-    snapshot->finish();
+    if (snapshot) {
+      snapshot->write({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+      snapshot->finish();
+    }
   }
   csv.finish();
   json.write(to_json_value(options, scene, *engine, totals).dump(2) + "\n");
   json.finish();
-  if (wants_table(options.run)) fmt::print("{}", summary(options, scene, *engine, totals));
-  if (options.run.hash) fmt::print("{}\n", hex(state_hash(engine->states())));
-  return report_trouble(engine->device_failure(), engine->trouble());
+  std::string text;
+  if (wants_table(options.run)) text += summary(options, scene, *engine, totals);
+  if (options.run.hash) text += hex(state_hash(engine->states())) + "\n";
+  if (writes) fmt::print("{}", text);
+  return report_trouble_of_rank(options, *engine);
 }
 
 /// Rejects options of other engines.
@@ -178,7 +263,8 @@ void check_engine(const CLI::App& command, const CommandOptions& options) {
     }
   };
   require(EngineKind::bullet, {"--solver", "--world", "--minimum-batch"});
-  require(EngineKind::native, {"--resolver", "--substeps", "--snapshot"});
+  require(EngineKind::native,
+          {"--resolver", "--substeps", "--snapshot", "--from", "--checkpoint", "--states"});
 }
 
 }  // namespace
@@ -203,8 +289,20 @@ void add_run_command(CLI::App& app, int& status) {
   command->add_option("--record", options->run.record,
                       "Write the state after every step to this file (see: jfpx replay)");
   command->add_option("--snapshot", options->snapshot,
-                      "Native engine: write the state after the last step to this file (see: jfpx "
-                      "replay --from)");
+                      "Native engine: write the state after the last step to this file (see: "
+                      "--from, jfpx replay --from)");
+  command
+      ->add_option("--checkpoint", options->checkpoint,
+                   "Native engine: write a snapshot to the file FILE after every EVERY steps, from "
+                   "which --from continues")
+      ->type_name("EVERY FILE");
+  command->add_option(
+      "--from", options->from,
+      "Native engine: continue from this snapshot of a run of the same scene, up to "
+      "step --steps, with any number of threads and ranks");
+  command->add_option("--states", options->states,
+                      "Native engine: write the states of the bodies after the last step to this "
+                      "file, for numpy.load(); several ranks write together");
   CLI::Option* const trajectory =
       command->add_option("--trajectory", options->trajectory,
                           "Write the bodies at the start and after every step to this file, for "
@@ -221,8 +319,19 @@ void add_run_command(CLI::App& app, int& status) {
     if (options->trajectory_every == 0) {
       throw InvalidArgument("--trajectory-every is 0; it must be at least 1");
     }
-    status = run(*options);
+    if (command->count("--checkpoint") > 0 && options->checkpoint.first == 0) {
+      throw InvalidArgument("--checkpoint: EVERY is 0; it must be at least 1");
+    }
+    status = run_on_ranks([&options](const std::shared_ptr<Communicator>& communicator) {
+      CommandOptions on_ranks = *options;
+      on_ranks.run.communicator = communicator;
+      return run(on_ranks);
+    });
   });
+  command->footer(
+      "mpirun -n RANKS jfpx run SCENE ... divides the world among processes, in a build with MPI: "
+      "the results\nare those of one process, and rank 0 writes them. --threads is for each rank. "
+      "Only the native engine\nand scenes run so.");
 }
 
 }  // namespace tool

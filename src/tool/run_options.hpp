@@ -2,11 +2,13 @@
 #pragma once
 
 #include <jfpx/backend.hpp>
+#include <jfpx/communicator.hpp>
 #include <jfpx/scene.hpp>
 
 #include "src/scenes/scenes.hpp"
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -50,7 +52,14 @@ struct RunOptions {
   std::string solver = "jfpx", world = "jfpx";  ///< parts of Bullet: "jfpx" or "stock"
   std::string json, csv, record;
   bool hash = false, quiet = false;
+  /// The processes that run together, of which each makes the same calls; null: one process.
+  std::shared_ptr<Communicator> communicator = nullptr;
 };
+
+/// Whether this process writes to stdout and files: the only one, or rank 0.
+inline bool writes_output(const RunOptions& options) {
+  return options.communicator == nullptr || options.communicator->rank() == 0;
+}
 
 /// False if stdout receives only JSON or CSV, or nothing.
 inline bool wants_table(const RunOptions& options) {

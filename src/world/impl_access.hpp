@@ -10,6 +10,7 @@ inline namespace JFPX_ABI {
 struct WorldAccess {
   using Impl = World::Impl;
   static Impl& impl(World& world) { return *world.impl_; }
+  static const Impl& impl(const World& world) { return *world.impl_; }
 };
 
 }  // namespace JFPX_ABI

@@ -16,6 +16,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/contacts/neighbor_list.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device/automatic_device.cpp
   ${CMAKE_CURRENT_LIST_DIR}/device/device_world.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/drawing/debug_draw.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces/force_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces/force_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/forces/forces.cpp
@@ -27,6 +28,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/queries/query_arguments.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/query_tree.cpp
   ${CMAKE_CURRENT_LIST_DIR}/queries/solid_query.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/ranks/contact_exchange.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/ranks/world_ranks.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_calls.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recorded_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/recording/recording.cpp
@@ -46,7 +49,8 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/world_queries.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_queue.cpp
   ${CMAKE_CURRENT_LIST_DIR}/world_snapshot.cpp
-  ${CMAKE_CURRENT_LIST_DIR}/world_state.cpp)
+  ${CMAKE_CURRENT_LIST_DIR}/world_state.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/world_states_file.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/block_solve_programs.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/contact_programs.cu

@@ -68,18 +68,32 @@ void World::Impl::find_contacts(StepReport* report) {
                                                pool.get(), soft_step.last_contacts(), &set, &found);
   report->sphere_contacts = spheres + found.sphere_count;
   report->contacts = spheres + found.contacts.size();
-  copy_array(pool.get(), store.moving.position, &found.position);
-  if (has_hit_events()) {
-    copy_array(pool.get(), store.moving.velocity, &found.velocity);
-    copy_array(pool.get(), store.moving.angular_velocity, &found.angular_velocity);
-  }
+  keep_motion(&found);
   found.generated.clear();
+  if (ranks != nullptr) {
+    contact_exchange::share_detected(&ranks->domain(), contact_finder.crossing_spheres(), &set);
+  }
   if (generators.ids().empty()) return;
   ContactList& list = *contacts.last.storage();
   contacts.maker.make(found, set.view(), false, BodiesOfStep(store), scene.materials, &list);
   call_generators(&list.contacts, report);
   const auto generated = std::span(list.contacts).subspan(list.detected);
   found.generated.assign(generated.begin(), generated.end());
+}
+
+/// Keeps the motion at the start of the step for lists of contacts.
+void World::Impl::keep_motion(DetectedContacts* found) {
+  // Immovable bodies change with the owners only.
+  const std::uint64_t version = ranks == nullptr ? 0 : ranks->domain().version();
+  const bool copies_all = ranks == nullptr || version != found->version;
+  found->version = version;
+  const auto keep = [&](const auto& column, auto* kept) {
+    copies_all ? copy_array(pool.get(), column, kept) : copy_of_rank(column, kept);
+  };
+  keep(store.moving.position, &found->position);
+  if (!has_hit_events()) return;
+  keep(store.moving.velocity, &found->velocity);
+  keep(store.moving.angular_velocity, &found->angular_velocity);
 }
 
 /// Calls the contact generators, which append to the list of contacts.
@@ -90,9 +104,10 @@ void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report
   report->generated_contacts = list->size() - count;
 }
 
-/// Number of awake movable bodies.
+/// Number of awake movable bodies, of this rank.
 std::uint32_t World::Impl::count_awake() const {
-  const std::span<const std::uint32_t> bodies = store.mobile();
+  const std::span<const std::uint32_t> bodies =
+      ranks == nullptr ? store.mobile() : ranks->domain().mine();
   return parallel_reduce(
       pool.get(), bodies.size(), kBodiesPerTask, 0u,
       [&](std::size_t first, std::size_t last) {
@@ -125,16 +140,23 @@ bool World::Impl::advance_soft_step(StepReport* report) {
   forces.call(context);
   const double forces_ms = watch.lap_ms();
   start_detection();
+  if (ranks != nullptr) {
+    ranks->update_ghosts(&store, joints, scene.soft_step.speculative_margin);
+    contact_finder.set_domain(&ranks->domain());
+  }
   find_contacts(report);
   finish_detection(report);
   soft_step.add_generated(store, contacts.detected.generated);
   const double detect_ms = watch.lap_ms();
   if (!all_finite(soft_step.solve(&store, joints.view()), report)) return false;
-  const BegunCounts begun = count_begun_contacts(soft_step.contacts().view(), pool.get());
+  const BegunCounts begun = count_begun_contacts(
+      soft_step.contacts().view(), ranks == nullptr ? nullptr : &ranks->domain(), pool.get());
   report->contacts += begun.spheres + begun.points;
   report->sphere_contacts += begun.spheres;
-  soft_step.commit(&store, steps, contact_finder.sub_shapes().view(), contact_finder.fixed_trees());
+  soft_step.commit(&store, steps, contact_finder.sub_shapes().view(), contact_finder.fixed_trees(),
+                   contact_finder.present());
   joints.commit();
+  if (ranks != nullptr) ranks->complete_step();
   report->integrate_ms = forces_ms;
   report->detect_ms = detect_ms;
   report->resolve_ms = watch.lap_ms();
@@ -145,7 +167,8 @@ bool World::Impl::advance_soft_step(StepReport* report) {
 /// torques only if there are callbacks that add to them. Copying all arrays would take longer than
 /// some stages of a step on many threads.
 void World::Impl::save_for_undo() {
-  const MotionArrays& now = bodies().moving;
+  if (resident()) fetch_motion();
+  const MotionArrays& now = store.moving;
   is_saved = true;
   if (scene.solver == Solver::worst_first) {
     before = now;
@@ -160,8 +183,21 @@ void World::Impl::save_for_undo() {
     copy_array(pool.get(), now.force, &before.force);
     copy_array(pool.get(), now.torque, &before.torque);
   }
-  each_saved([this](const auto& from, auto& to) { copy_array(pool.get(), from, &to); }, now,
-             before);
+  each_saved([this](const auto& from, auto& to) { copy_of_rank(from, &to); }, now, before);
+}
+
+/// copy_array(), with several ranks only of the bodies of this rank. Those of other ranks are not
+/// up to date.
+template <class Item>
+void World::Impl::copy_of_rank(const std::vector<Item>& array, std::vector<Item>* copy) {
+  if (ranks == nullptr) return copy_array(pool.get(), array, copy);
+  resize_geometric(copy, array.size());
+  const std::span<const std::uint32_t> bodies = ranks->domain().mine();
+  parallel_for(pool.get(), bodies.size(), kBodiesPerTask, [&](std::size_t first, std::size_t last) {
+    for (const std::uint32_t i : bodies.subspan(first, last - first)) {
+      (*copy)[i] = array[i];
+    }
+  });
 }
 
 /// Restores the motion that save_for_undo() has copied.
@@ -174,7 +210,12 @@ void World::Impl::undo_motion() noexcept {
       std::swap(now.force, before.force);
       std::swap(now.torque, before.torque);
     }
-    each_saved([](auto& a, auto& b) { std::swap(a, b); }, now, before);
+    each_saved(
+        [this](auto& array, auto& saved) {
+          if (ranks == nullptr) return std::swap(array, saved);
+          for (const std::uint32_t i : ranks->domain().mine()) array[i] = saved[i];
+        },
+        now, before);
   }
   is_saved = false;
 }
@@ -213,6 +254,33 @@ void World::Impl::report_backend(StepReport* report) const {
   report->choice = device_failure.empty() ? collider.reason() : ChoiceReason::device_failed;
 }
 
+/// Precedes save_for_undo(): what a rank receives for new owners is not undone.
+void World::Impl::start_step_of_ranks() {
+  if (!forces.ids().empty()) collect();
+  ranks->start_step(&store, &joints, steps, &soft_step.last_contacts(), &contacts.detected);
+}
+
+/// Adds the numbers of all ranks.
+void World::Impl::add_ranks(StepReport* report) {
+  struct Counts {
+    std::uint64_t contacts = 0, sphere_contacts = 0, awake = 0, load = 0;
+  };
+  const Counts own{report->contacts, report->sphere_contacts, report->awake,
+                   WorldRanks::load(report->awake, soft_step.last_contacts())};
+  Counts sum;
+  std::uint64_t most = 0;
+  const std::vector<Counts> all = ranks->domain().gather(own);
+  for (const Counts& c : all) {
+    sum = {sum.contacts + c.contacts, sum.sphere_contacts + c.sphere_contacts, sum.awake + c.awake,
+           sum.load + c.load};
+    most = std::max(most, c.load);
+  }
+  ranks->note_loads(most, sum.load / all.size());
+  report->contacts = sum.contacts;
+  report->sphere_contacts = sum.sphere_contacts;
+  report->awake = static_cast<std::uint32_t>(sum.awake);
+}
+
 StepReport World::Impl::make_step() {
   StepReport report;
   Stopwatch watch;
@@ -225,6 +293,7 @@ StepReport World::Impl::make_step() {
     return report;
   }
   try {
+    if (ranks != nullptr) start_step_of_ranks();
     choose_device(&report);
     // A step on the device changes nothing on the host, unless the host applies the forces.
     is_saved = false;
@@ -242,6 +311,9 @@ StepReport World::Impl::make_step() {
       undo();
       report.contacts = report.sphere_contacts = report.generated_contacts = 0;
     }
+  } catch (const WorldRanks::OwnersChanged&) {
+    undo();
+    return make_step();
   } catch (const std::bad_alloc&) {
     undo();
     throw OutOfMemory(no_memory_for("a step", store.size()) + ", and more for their contacts");
@@ -253,6 +325,7 @@ StepReport World::Impl::make_step() {
   report_backend(&report);
   if (report.non_finite && resident()) fetch_motion();  // the device reports complete steps only
   if (report.non_finite || !resident()) report.awake = count_awake();
+  if (ranks != nullptr) add_ranks(&report);
   report.total_ms = watch.lap_ms();
   spent_us = 1e3 * report.total_ms;
   note_rest(report);
@@ -260,6 +333,14 @@ StepReport World::Impl::make_step() {
 }
 
 World::World(const Scene& scene, const WorldSettings& settings) {
+  const bool has_ranks = settings.communicator != nullptr && settings.communicator->size() > 1;
+  if (has_ranks && settings.collider.backend == Backend::cuda) {
+    throw InvalidArgument("the backend is cuda; it must be cpu for a world of several ranks");
+  }
+  if (has_ranks && scene.solver != Solver::soft_step) {
+    throw InvalidArgument(
+        "the solver is worst_first; it must be soft_step for a world of several ranks");
+  }
   if (settings.collider.threads != 1) {
     throw InvalidArgument("collider.threads of a world is " +
                           std::to_string(settings.collider.threads) +
@@ -270,14 +351,16 @@ World::World(const Scene& scene, const WorldSettings& settings) {
                           "; it must be > 0; infinity is allowed");
   }
   auto pool = std::make_unique<ThreadPool>(settings.threads);
-  auto collider = make_sphere_collider(settings.collider, pool.get());
+  SphereColliderOptions options = settings.collider;
+  if (has_ranks) options.backend = Backend::cpu;
+  auto collider = make_sphere_collider(options, pool.get());
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase,
-                     settings.collider.simd);
+                     settings.collider.simd, settings.communicator);
   impl_->hit_speed = settings.hit_speed;
-  if (settings.collider.backend == Backend::cuda && scene.solver == Solver::soft_step) {
+  if (options.backend == Backend::cuda && scene.solver == Solver::soft_step) {
     impl_->device = make_device_world(scene, settings.collider.device);
   }
-  if (settings.collider.backend == Backend::automatic && backend_row(Backend::cuda).compiled) {
+  if (options.backend == Backend::automatic && backend_row(Backend::cuda).compiled) {
     impl_->automatic = std::make_unique<AutomaticDevice>(
         settings.collider.costs, [number = settings.collider.device] {
           return Impl::warmed(make_device_world(Scene{}, number));
@@ -294,10 +377,12 @@ World::World(const Scene& scene, std::unique_ptr<SphereCollider> collider, Broad
 
 std::unique_ptr<World::Impl> World::Impl::make(const Scene& scene, std::unique_ptr<ThreadPool> pool,
                                                std::unique_ptr<SphereCollider> collider,
-                                               BroadPhase broad_phase, SimdLevel simd) {
+                                               BroadPhase broad_phase, SimdLevel simd,
+                                               std::shared_ptr<Communicator> communicator) {
   validate(scene);
   try {
-    return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase, simd);
+    return std::make_unique<Impl>(scene, std::move(pool), std::move(collider), broad_phase, simd,
+                                  std::move(communicator));
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(no_memory_for("a world", scene.bodies.size()));
   }

@@ -13,6 +13,7 @@
 #include "src/world/forces/callback_registry.hpp"
 #include "src/world/joints/joint_store.hpp"
 #include "src/world/queries/query_tree.hpp"
+#include "src/world/ranks/world_ranks.hpp"
 #include "src/world/snapshots/force_snapshot.hpp"
 #include "src/world/snapshots/snapshot_file.hpp"
 #include "src/world/step/soft_step.hpp"
@@ -28,14 +29,17 @@ struct World::Impl {
   /// Validates the scene. @throws InvalidScene, InvalidArgument, OutOfMemory
   static std::unique_ptr<Impl> make(const Scene& scene, std::unique_ptr<ThreadPool> pool,
                                     std::unique_ptr<SphereCollider> collider,
-                                    BroadPhase broad_phase, SimdLevel simd);
+                                    BroadPhase broad_phase, SimdLevel simd,
+                                    std::shared_ptr<Communicator> communicator = nullptr);
   Impl(const Scene& given, std::unique_ptr<ThreadPool> threads,
-       std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase, SimdLevel simd)
+       std::unique_ptr<SphereCollider> collider, BroadPhase broad_phase, SimdLevel simd,
+       std::shared_ptr<Communicator> communicator)
       : pool(std::move(threads)),
         scene(settings_of(given)),
         store(empty_store(given)),
+        ranks(make_ranks(std::move(communicator), pool.get())),
         contact_finder(make_broad_phase(std::move(collider), broad_phase), simd),
-        soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd),
+        soft_step(given.soft_step, given.materials, given.dt, pool.get(), simd, ranks.get()),
         worst_first(make_worst_first_step(given)) {
     store.reserve(given.bodies.size());
     for (const BodyDef& def : given.bodies) store.add(def);
@@ -62,12 +66,14 @@ struct World::Impl {
   const BodyStore& bodies() {
     finish();
     if (resident()) fetch_motion();
+    if (ranks != nullptr) ranks->collect(&store);
     return store;
   }
   /// The bodies for reading the columns of BodyState; copies less than half as much as bodies().
   const BodyStore& bodies_with_states() {
     finish();
     if (resident()) fetch_states();
+    if (ranks != nullptr) ranks->collect(&store);
     return store;
   }
   /// The bodies for a change. The next step uploads the world again.
@@ -75,12 +81,17 @@ struct World::Impl {
     finish();
     steps_at_rest = 0;
     if (resident()) leave_device();
+    collect();
     return store;
   }
   /// Adds a body, also on the device if the device has the state.
   BodyId add(const BodyDef& def);
   /// Removes a body, also on the device. Wakes the bodies in contact with it.
   void remove(BodyId id);
+  /// Gives a body another definition, on the host. Wakes the bodies in contact with it.
+  void replace(BodyId id, const BodyDef& def);
+  /// @throws InvalidArgument if a joint of a body has no other movable body
+  void require_other_movable(std::uint32_t body) const;
   /// The bodies for an edit of one of them. While the device has the state, the motion of other
   /// bodies may be outdated, and the next step applies the edit on the device, too.
   BodyStore& edited_body(std::uint32_t body, const BodyEdit& edit);
@@ -99,11 +110,20 @@ struct World::Impl {
   void fetch_joints();
   /// Copies changed joints to the device.
   void flush_joints();
+  /// With several ranks: fetches the state of bodies and joints of the other ranks.
+  void collect() {
+    if (ranks == nullptr) return;
+    ranks->collect(&store);
+    ranks->gather_joints(&joints);
+  }
+  /// Fetches the contacts of the last step, or of the step before, of the other ranks.
+  void collect_contacts(bool of_step_before);
   /// Common start of all edits.
   void begin_edit() {
     finish();
     hold_graphs();
     steps_at_rest = 0;
+    collect();
   }
   /// [m], of the centre of mass
   Vec3 position(std::uint32_t body);
@@ -183,6 +203,12 @@ struct World::Impl {
                  joints] = scene;
     return {name, dt, {}, solver, soft_step, resolver, sleep, materials, {}, {}};
   }
+  /// @returns null for a single rank
+  static std::unique_ptr<WorldRanks> make_ranks(std::shared_ptr<Communicator> communicator,
+                                                ThreadPool* pool) {
+    if (communicator == nullptr || communicator->size() == 1) return nullptr;
+    return std::make_unique<WorldRanks>(std::move(communicator), pool);
+  }
   /// A store without bodies for a scene.
   static BodyStore empty_store(const Scene& scene) {
     return {scene.dt, scene.sleep,
@@ -224,6 +250,7 @@ struct World::Impl {
   /// Must be called after a body was added or removed, or got another state by set_state().
   void note_change() noexcept {
     bodies_changed = true;
+    if (ranks != nullptr) ranks->note_change();
     query_tree.invalidate();
   }
 
@@ -244,6 +271,8 @@ struct World::Impl {
   void report_backend(StepReport* report) const;
   bool advance(StepReport* report);
   bool advance_soft_step(StepReport* report);
+  void start_step_of_ranks();
+  void add_ranks(StepReport* report);
   void choose_device(StepReport* report);
   bool advance_on_device(StepReport* report);
   bool step_on_device(StepReport* report);
@@ -254,6 +283,9 @@ struct World::Impl {
   JFPX_API static bool all_finite(const std::optional<BodyId>& runaway, StepReport* report);
   JFPX_API void start_detection();
   void find_contacts(StepReport* report);
+  void keep_motion(DetectedContacts* found);
+  template <class Item>
+  void copy_of_rank(const std::vector<Item>& array, std::vector<Item>* copy);
   JFPX_API void finish_detection(StepReport* report);
   JFPX_API void call_generators(std::vector<Contact>* list, StepReport* report);
   std::uint32_t count_awake() const;
@@ -264,10 +296,11 @@ struct World::Impl {
   SnapshotParts snapshot_parts() const;
   void read(BinaryReader* reader);
 
-  std::unique_ptr<ThreadPool> pool;  ///< may be shared with the collider
-  Scene scene;                       ///< the settings, without bodies, pairs and joints
-  BodyStore store;                   ///< the motion may be outdated: see `mirror`
-  JointStore joints;                 ///< impulses and colors may be outdated: see `mirror`
+  std::unique_ptr<ThreadPool> pool;   ///< may be shared with the collider
+  Scene scene;                        ///< the settings, without bodies, pairs and joints
+  BodyStore store;                    ///< the motion may be outdated: see `mirror`
+  std::unique_ptr<WorldRanks> ranks;  ///< null: a single rank
+  JointStore joints;                  ///< impulses and colors may be outdated: see `mirror`
   ContactFinder contact_finder;
   SoftStep soft_step;                           ///< of Solver::soft_step
   std::unique_ptr<WorstFirstStep> worst_first;  ///< of Solver::worst_first; otherwise null

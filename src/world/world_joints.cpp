@@ -40,6 +40,7 @@ void World::Impl::begin_joint_edit(const JoinedBodies& joined) {
 }
 
 void World::Impl::complete_joint_edit(const JoinedBodies& joined) {
+  if (ranks != nullptr) ranks->note_change();
   mirror.joints = HostMirror::Joints::newer_on_host;
   joined.for_each([this](std::uint32_t body) { wake(body); });
 }
@@ -81,6 +82,18 @@ void World::Impl::set_joint(std::uint32_t joint, const Joint& value) {
   complete_joint_edit({a, b, excludes});
 }
 
+void World::Impl::require_other_movable(std::uint32_t body) const {
+  joints.for_each_of(body, [&](std::uint32_t joint) {
+    bool any_other = false;
+    joined_bodies(joints.joint(joint)).for_each([&](std::uint32_t i) {
+      any_other |= i != body && store.movable(i);
+    });
+    if (any_other) return;
+    throw InvalidArgument("mass is 0; it must be > 0, because joint " + std::to_string(joint) +
+                          " has no other movable body");
+  });
+}
+
 /// Removes the joints of a body before its removal, and wakes the bodies joined with it.
 void World::Impl::remove_joints_of(std::uint32_t body) {
   bool any = false;
@@ -104,6 +117,7 @@ void World::Impl::remove_joints_of(std::uint32_t body) {
 }
 
 void World::Impl::fetch_joints() {
+  collect();
   const std::lock_guard lock(fetching);
   if (mirror.joints != HostMirror::Joints::newer_on_device) return;
   device->fetch_joints(&joints);

@@ -149,6 +149,20 @@ void World::Impl::remove(BodyId id) {
   force_table.invalidate();
 }
 
+void World::Impl::replace(BodyId id, const BodyDef& def) {
+  const std::uint32_t body = id.index;
+  if (!(def.mass > 0) && store.movable(body)) require_other_movable(body);
+  begin_edit();
+  if (resident()) leave_device();
+  BodyStore::Replacement prepared = store.prepare(body, def);
+  soft_step.reserve(store.capacity());
+  make_contact_lists();
+  wake_neighbors(id);
+  // From here on, nothing throws.
+  store.replace(body, def, std::move(prepared));
+  soft_step.forget(body);
+}
+
 void World::Impl::note_forces() {
   mirror.forced_bodies.clear();
   for (const BodyId id : store.ids()) mirror.forced_bodies.push_back(id.index);
@@ -170,6 +184,7 @@ void World::Impl::flush_edits() {
 
 Vec3 World::Impl::position(std::uint32_t body) {
   finish();
+  collect();
   if (!resident() || mirror.motion >= Motion::states) return store.moving.position[body];
   const auto edit = mirror.edits.find(body);
   if (edit != mirror.edits.end() && (edit->second.sets_state || edit->second.is_added))
@@ -198,6 +213,7 @@ void World::Impl::fetch_states() {
 }
 
 void World::Impl::make_list(bool of_step_before, ContactList* list) {
+  collect_contacts(of_step_before);
   const std::lock_guard lock(fetching);
   const ScopedTimer timer(&spent_us);
   DetectedContacts* found = of_step_before ? &contacts.detected_before : &contacts.detected;
@@ -208,6 +224,15 @@ void World::Impl::make_list(bool of_step_before, ContactList* list) {
                                      : of_step_before ? soft_step.contacts_before()
                                                       : soft_step.last_contacts().view();
   contacts.maker.make(*found, set, true, bodies, scene.materials, list);
+}
+
+void World::Impl::collect_contacts(bool of_step_before) {
+  if (ranks == nullptr) return;
+  if (of_step_before) {
+    ranks->gather_before(&soft_step.set_before(), &contacts.detected_before);
+  } else {
+    ranks->gather_last(&soft_step.last_contacts(), &contacts.detected);
+  }
 }
 
 const ContactList& World::Impl::contact_list() {
@@ -222,6 +247,7 @@ const ContactList& World::Impl::contact_list_before() {
 const std::vector<ContactForce>& World::Impl::contact_forces() {
   return contacts.forces.get([this](std::vector<ContactForce>* list) {
     if (resident()) fetch_contact_set();
+    collect_contacts(false);
     make_contact_forces(soft_step.last_contacts().view(), soft_step.inverse_h(), store, pool.get(),
                         list);
   });
@@ -229,6 +255,7 @@ const std::vector<ContactForce>& World::Impl::contact_forces() {
 
 const std::vector<HitEvent>& World::Impl::hit_events() {
   return contacts.hits.get([this](std::vector<HitEvent>* hits) {
+    collect_contacts(false);
     const std::lock_guard lock(fetching);
     const ScopedTimer timer(&spent_us);
     soft_step::ContactSet fetched;
@@ -260,6 +287,8 @@ void World::Impl::fetch_contact_set() {
 void World::Impl::fetch_all() {
   finish();
   make_contact_lists();
+  collect();
+  collect_contacts(false);
   if (resident()) {
     fetch_motion();
     fetch_contact_set();

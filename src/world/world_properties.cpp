@@ -53,12 +53,14 @@ void World::set_motion_locks(BodyId id, const MotionLocks& locks) {
   BodyStore& bodies = impl_->store;
   const std::uint32_t body = bodies.require(id);
   require_valid(find_locks_fault(locks, impl_->scene.solver));
-  if (!bodies.movable(body) || bodies.motion_locks(body) == locks) return;
+  if (bodies.immovable(body) || bodies.motion_locks(body) == locks) return;
   const BodyState state = impl_->bodies_with_states().state(body);
   impl_->edited_body(body, {.sets_state = true, .sets_mass = true, .wakes = true})
       .set_motion_locks(body, locks);
-  bodies.refresh_inertia(body);
-  bodies.set_velocities(body, state);
+  if (bodies.movable(body)) {
+    bodies.refresh_inertia(body);
+    bodies.set_velocities(body, state);
+  }
   impl_->note_change();
 }
 

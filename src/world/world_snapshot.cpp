@@ -88,6 +88,7 @@ void World::Impl::read(BinaryReader* reader) {
   new_forces.commit(&forces);
   new_generators.commit(&generators);
   note_change();
+  if (ranks != nullptr) ranks->note_restored();
 }
 
 Snapshot World::snapshot() const {

@@ -27,6 +27,17 @@ void World::remove(BodyId id) {
   impl_->note_change();
 }
 
+BodyDef World::definition(BodyId id) const {
+  return impl_->bodies_with_states().definition(impl_->store.require(id));
+}
+
+void World::replace(BodyId id, const BodyDef& body) {
+  validate_body(body, impl_->store.require(id), impl_->scene.solver);
+  impl_->replace(id, body);
+  impl_->note_change();
+  impl_->contacts.shows_list = false;
+}
+
 std::span<const BodyId> World::bodies() const { return impl_->store.ids(); }
 
 bool World::contains(BodyId id) const noexcept { return impl_->store.contains(id); }
@@ -170,6 +181,9 @@ std::span<const ForceId> World::forces() const { return impl_->forces.ids(); }
 
 ContactGeneratorId World::add_any_generator(std::function<void(ContactContext&)> generator) {
   impl_->finish();
+  if (impl_->ranks != nullptr) {
+    throw InvalidArgument("a world of several ranks has no contact generators");
+  }
   const ContactGeneratorId id = impl_->generators.add(std::move(generator));
   impl_->wake_all();
   return id;

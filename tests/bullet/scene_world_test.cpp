@@ -146,6 +146,35 @@ TEST(SceneWorld, AKinematicBodyMovesByItsVelocitiesAndPushes) {
   EXPECT_GT(world.states()[0].velocity.x, Real(1.9));
 }
 
+/// Bullet gives the belt its velocity, although it keeps its pose.
+TEST(SceneWorld, ConveyorsDriveBodiesAndKeepTheirPose) {
+  Scene scene;
+  scene.bodies = {ball({0, Real(0.2), 0}), ball({0, -1, 0})};
+  scene.bodies[0].shape = Box{{Real(0.5), Real(0.2), Real(0.5)}};
+  scene.bodies[1].shape = Box{{20, 1, 20}};
+  scene.bodies[1].mass = 0;
+  scene.bodies[1].kinematic = true;
+  scene.bodies[1].velocity = {2, 0, 0};
+  scene.bodies[1].motion_locks = kFixedPose;
+  SceneWorld world(scene);
+  for (int i = 0; i < 120; ++i) world.step();
+  const BodyState belt = world.states()[1];
+  EXPECT_EQ(belt.position, scene.bodies[1].position);
+  EXPECT_EQ(belt.orientation, scene.bodies[1].orientation);
+  EXPECT_NEAR(belt.velocity.x, 2, 1e-3);
+  EXPECT_NEAR(world.states()[0].velocity.x, 2, 0.01);
+  EXPECT_GT(world.states()[0].position.x, 3);
+
+  // A tilted turntable.
+  scene.bodies[1].orientation = normalized(Quat{1, Real(0.1), Real(0.2), Real(0.3)});
+  scene.bodies[1].angular_velocity = {0, 1, 0};
+  SceneWorld tilted(scene);
+  const BodyState first = tilted.states()[1];
+  for (int i = 0; i < 120; ++i) tilted.step();
+  EXPECT_EQ(tilted.states()[1].orientation, first.orientation);
+  EXPECT_NEAR(tilted.states()[1].angular_velocity.y, 1, 0.01);  // from an arc cosine
+}
+
 TEST(SceneWorld, AcceptsADiagonalInertiaAndRejectsAnyOther) {
   Scene scene;
   scene.bodies = {ball({0, 0, 0}), ball({9, 0, 0})};

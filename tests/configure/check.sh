@@ -11,7 +11,7 @@ fail() {
   exit 1
 }
 configure() { # ARGS
-  cmake -B "$work/build" -G Ninja -DCMAKE_CXX_COMPILER="$CXX" -DJFPX_BULLET=OFF "$@" >"$work/log" 2>&1
+  cmake -B "$work/build" -G Ninja -DCMAKE_CXX_COMPILER="$CXX" -DJFPX_BULLET=OFF -DJFPX_MPI=OFF "$@" >"$work/log" 2>&1
 }
 # Line breaks of CMake's messages do not matter.
 said() { tr '\n' ' ' <"$work/log" | tr -s ' ' | grep -qF -- "$1"; }
@@ -86,6 +86,9 @@ fmt libfmt-dev
 GTest libgtest-dev libgmock-dev
 benchmark libbenchmark-dev
 END
+    refuses "JFPX_MPI=ON, but MPI 3.0 or newer was not found" "${common[@]}" -DJFPX_MPI=ON -DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON
+    said "sudo apt install libopenmpi-dev openmpi-bin, or scripts/setup" || fail "$(cat "$work/log")"
+    rm -r "$work/build"
     printf '#!/bin/sh\nexec g++ -w -U__GNUC__ -D__GNUC__=11 "$@"\n' >"$work/g++-11"
     chmod +x "$work/g++-11"
     CXX=$work/g++-11 refuses "is GNU 11" "${common[@]}"

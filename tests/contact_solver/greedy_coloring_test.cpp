@@ -75,14 +75,14 @@ TEST(GreedyColoring, IsThatOfTheSortedContactsForAnyNumberOfThreads) {
     }
     const std::vector<std::uint8_t> expected = colored_one_by_one(keys, bodies, bodies / 2);
     for (ThreadPool* const p : {static_cast<ThreadPool*>(nullptr), &pool}) {
-      coloring.start(bodies, p);
+      coloring.start(bodies, p, nullptr);
       GreedyColoring::Portion portion(&coloring);
       for (std::uint32_t i = 0; i < count; ++i) {
         portion.add(keys[i], i, keys[i].a < bodies / 2 && keys[i].b < bodies / 2);
       }
       portion.flush();
       std::vector<std::uint8_t> colors(count, kNoColor);
-      coloring.finish([&](std::uint32_t i, std::uint8_t color) { colors[i] = color; }, p);
+      coloring.finish([&](std::uint32_t i, std::uint8_t color) { colors[i] = color; }, p, nullptr);
       EXPECT_EQ(colors, expected) << count << " contacts";
     }
     if (count == 20000) {

@@ -35,7 +35,8 @@ tests/docs/links.sh README.md CHANGELOG.md packaging/README.md docs/*.md docs/re
 # The reference has every public header and every name of the Python package, once.
 diff <(cd include && find jfpx -name '*.hpp' | sort) <(cat docs/reference/cpp_*.md | sed -n 's/^## \(jfpx.*\)/\1/p' | sort) ||
   complain "docs/reference/cpp_*.md (>) do not have the headers of include (<)"
-diff <(sed -n '/^__all__/,$p' python/jfpx/__init__.py | grep -oE '"[A-Za-z_]+"' | tr -d '"' | sort) \
+diff <(sed -n '/^__all__/,$p' python/jfpx/__init__.py | grep -oE '"[A-Za-z_]+"' | tr -d '"' | cat - <(sed -nE \
+  's/^__all__ = \["(\w+)"\]$/mpi.\1/p' python/jfpx/mpi.py) | sort) \
   <(cat docs/reference/python_*.md | sed -n 's/^\.\. auto[a-z]*:: jfpx\.//p' | sort) ||
   complain "docs/reference/python_*.md (>) do not have the names of the Python package (<)"
 

@@ -6,16 +6,18 @@ set -u
 cd "$(dirname "$0")/../.."
 declare -A allowed=(
   [base]=""
+  [ranks]="base"
   [collide]="base"
   [scene]="base collide"
   [sphere_collider]="base collide scene"
-  [contact_solver]="base collide scene sphere_collider"
-  [world]="base collide scene sphere_collider contact_solver"
-  [thesis]="base collide scene sphere_collider contact_solver world"
+  [contact_solver]="base ranks collide scene sphere_collider"
+  [world]="base ranks collide scene sphere_collider contact_solver"
+  [thesis]="base ranks collide scene sphere_collider contact_solver world"
+  [mpi]="base"
   [bullet]="base collide scene sphere_collider contact_solver"
   [scenes]="base"
   [demos]="base scenes"
-  [tool]="base collide scene sphere_collider contact_solver world thesis bullet scenes demos"
+  [tool]="base ranks collide scene sphere_collider contact_solver world thesis mpi bullet scenes demos"
   [viewer]="base collide scene sphere_collider contact_solver world thesis bullet scenes demos tool"
 )
 # SceneWorld integrates kinematic bodies with the code of the native world.
@@ -40,7 +42,7 @@ while IFS=: read -r file target; do
   [ -z "$own" ] || [ "$own" = "$other" ] || { echo "$file includes src/$target, another backend"; status=1; }
 done < <(grep -rHoE '^ *#include "src/[^"]+' src | sed 's/ *#include "src\///')
 # Folders of src/world, the lowest first. A folder may include those before it, and no file of src/world itself.
-world_folders=(bodies contacts joints forces queries character step device cuda snapshots recording)
+world_folders=(bodies contacts joints ranks forces queries character drawing step device cuda snapshots recording)
 while IFS=: read -r file target; do
   from=${file#src/world/} to=${target#world/}
   case "$from" in */*) from=${from%%/*} ;; *) continue ;; esac

@@ -316,6 +316,16 @@ void change_properties(Bytes& bytes, Twins& twins) {
   }
 }
 
+/// Gives a body another definition, which a joint may prevent.
+void replace_body(Bytes& bytes, Twins& twins) {
+  const BodyId id = draw_id(bytes, twins.world().bodies());
+  BodyDef def = draw_body(bytes);
+  def.filter = draw_filter(bytes);
+  def.sensor = bytes.chance(Real(0.7));
+  const auto replaced = twins.both([&](World& w) { w.replace(id, def); });
+  require(!replaced || twins.world().mass(id) == def.mass, "a mass is that of the definition");
+}
+
 /// The observable result of a step.
 struct Moment {
   Snapshot snapshot;
@@ -366,6 +376,7 @@ void call_anything(Bytes& bytes, Twins& twins, std::optional<Snapshot>* kept) {
   if (byte % 20 == 18) return change_properties(bytes, twins);
   if (byte % 20 == 9) return travel(bytes, twins, kept);
   if (byte % 40 == 8) return change_joints(bytes, twins);
+  if (byte % 40 == 28) return replace_body(bytes, twins);
   switch (byte % 10) {
     case 0:
       if (twins.world().bodies().size() >= kMaxBodies) break;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Uses jfpx as those do who install it. Usage: check.sh STEP BUILD WORK; the environment says what the
-# build has: KIND (static, shared), HAS_CUDA, HAS_BULLET, HAS_VIEWER (ON, OFF), CXX, LAUNCHER (of the
+# build has: KIND (static, shared), HAS_CUDA, HAS_BULLET, HAS_MPI, HAS_VIEWER (ON, OFF), CXX, LAUNCHER (of the
 # compiler).
 set -euo pipefail
 step=$1 build=$2 work=$3
@@ -26,12 +26,14 @@ run_programs() {
   for suffix in "" "$2"; do
     [ "$("$1/collider$suffix")" = "spheres 0 and 1 overlap by 0.5" ] || fail "collider$suffix"
     [ "$("$1/thesis$suffix")" = "a step of worst_first: 1 contact, 1 particle" ] || fail "thesis$suffix"
+    [ "$HAS_MPI" = OFF ] || [ "$("$1/ranks$suffix")" = "rank 0 of 1" ] || fail "ranks$suffix"
     [ "$HAS_BULLET" = OFF ] || "$1/bullet_app$suffix" | grep -E '[1-9][0-9]* contacts of spheres' || fail "bullet_app$suffix"
   done
 }
 components() {
   echo -n "thesis;"
   [ "$HAS_BULLET" = OFF ] || echo -n "bullet;"
+  [ "$HAS_MPI" = OFF ] || echo -n "mpi;"
   [ "$HAS_CUDA" = OFF ] || echo -n "cuda;"
 }
 libraries() { # of the installed tree that match
@@ -79,6 +81,7 @@ refused" ] || fail "$("$work/cmake/both")"
     ln -sfn "$root/examples" "$work/makefile/examples" # make knows no path with a space in it
     ln -sfn "$here/cmake" "$work/makefile/sources"
     programs="collider collider-f64 thesis thesis-f64"
+    [ "$HAS_MPI" = OFF ] || programs+=" ranks ranks-f64"
     [ "$HAS_BULLET" = OFF ] || programs+=" bullet_app bullet_app-f64"
     export LD_LIBRARY_PATH=${folder%/pkgconfig}
     PKG_CONFIG_PATH=$folder make -B -s -C "$work/makefile" -f "$here/makefile/Makefile" \
@@ -112,8 +115,13 @@ refused" ] || fail "$("$work/cmake/both")"
       if configure "$here/cmake" "$work/messages" "$@" >"$work/messages.txt" 2>&1; then fail "accepted: $*"; fi
       tr '\n' ' ' <"$work/messages.txt" | tr -s ' ' | grep -qF "$text" || fail "no \"$text\" in: $(cat "$work/messages.txt")"
     }
-    expect 'jfpx has no component "rockets"; it has thesis, bullet and cuda.' -DCOMPONENTS=rockets
+    expect 'jfpx has no component "rockets"; it has thesis, bullet, mpi and cuda.' -DCOMPONENTS=rockets
     [ "$HAS_CUDA" = ON ] || expect "This jfpx was built without CUDA" -DCOMPONENTS=cuda
+    if [ "$HAS_MPI" = OFF ]; then
+      expect "This jfpx was built without MPI" -DCOMPONENTS=mpi
+    else
+      expect "install libopenmpi-dev" -DCOMPONENTS=mpi -DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON
+    fi
     if [ "$HAS_BULLET" = OFF ]; then
       expect "This jfpx was built without Bullet" -DCOMPONENTS=bullet
     else
@@ -165,7 +173,7 @@ refused" ] || fail "$("$work/cmake/both")"
     checked=0
     while read -r library; do
       symbols=$(nm -DC --defined-only "$library" | cut -d' ' -f3-)
-      grep -qE '::(World::step|thesis::enable|bullet::CollisionDispatcher::dispatchAllCollisionPairs)\(' <<<"$symbols" || fail "$library exports: $symbols"
+      grep -qE '::(World::step|thesis::enable|mpi::Communicator::gather|bullet::CollisionDispatcher::dispatchAllCollisionPairs)\(' <<<"$symbols" || fail "$library exports: $symbols"
       foreign=$(grep -vE '^((vtable|typeinfo|typeinfo name) for |(non-virtual|virtual) thunk to )?jfpx::v[0-9]+_[0-9]+_f(32|64)::' <<<"$symbols" || true)
       [ -z "$foreign" ] || fail "$library exports: $foreign"
       ! objdump -p "$library" | grep -E 'NEEDED.*(cuda|cudart)' || fail "$library needs CUDA"
@@ -208,6 +216,11 @@ refused" ] || fail "$("$work/cmake/both")"
     depends jfpx-tools | grep -q 'libjfpx0.3 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
     depends libjfpx-thesis0.3 | grep -q 'libjfpx0.3 (= ' || fail "libjfpx-thesis0.3 depends on: $(depends libjfpx-thesis0.3)"
     depends jfpx-tools | grep -q 'libjfpx-thesis0.3 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+    if [ "$HAS_MPI" = ON ]; then
+      depends libjfpx-mpi0.3 | grep -q 'libjfpx0.3 (= ' || fail "libjfpx-mpi0.3 depends on: $(depends libjfpx-mpi0.3)"
+      depends jfpx-tools | grep -q 'libjfpx-mpi0.3 (= ' || fail "jfpx-tools depends on: $(depends jfpx-tools)"
+      ! depends libjfpx0.3 | grep -q mpi || fail "libjfpx0.3 depends on MPI"
+    fi
     if [ "$HAS_VIEWER" = ON ]; then
       depends jfpx-tools | grep -q libsdl2 || fail "jfpx-tools depends on: $(depends jfpx-tools)"
       depends jfpx-tools Recommends | grep -qx 'libegl1, libgl1, libgl1-mesa-dri' ||

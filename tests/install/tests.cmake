@@ -9,7 +9,7 @@ function(jfpx_add_install_test step name)
     ${CMAKE_CURRENT_SOURCE_DIR}/install/check.sh ${step} ${PROJECT_BINARY_DIR} ${PROJECT_BINARY_DIR}/install-test)
   set_tests_properties(${name} PROPERTIES
     TIMEOUT 900 SKIP_REGULAR_EXPRESSION "skipped:" FIXTURES_REQUIRED installed
-    ENVIRONMENT "KIND=${kind};HAS_CUDA=${JFPX_HAS_CUDA};HAS_BULLET=${JFPX_HAS_BULLET};HAS_VIEWER=${JFPX_HAS_VIEWER};CXX=${CMAKE_CXX_COMPILER};LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}")
+    ENVIRONMENT "KIND=${kind};HAS_CUDA=${JFPX_HAS_CUDA};HAS_BULLET=${JFPX_HAS_BULLET};HAS_MPI=${JFPX_HAS_MPI};HAS_VIEWER=${JFPX_HAS_VIEWER};CXX=${CMAKE_CXX_COMPILER};LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER}")
 endfunction()
 jfpx_add_install_test(prefix Install.LeavesNoTraceOfWhereItWas)
 set_tests_properties(Install.LeavesNoTraceOfWhereItWas PROPERTIES FIXTURES_REQUIRED "" FIXTURES_SETUP installed)

@@ -4,13 +4,14 @@ import inspect
 import re
 
 import jfpx
+import jfpx.mpi
 
 
 def members():
     """Names and objects of the package, and of its classes, that users may call or read."""
     yield "jfpx", jfpx
-    for name in jfpx.__all__:
-        value = getattr(jfpx, name)
+    yield "jfpx.mpi", jfpx.mpi
+    for name, value in [(name, getattr(module, name)) for module in (jfpx, jfpx.mpi) for name in module.__all__]:
         if inspect.isclass(value) or inspect.isfunction(value):
             yield name, value
         if inspect.isclass(value):

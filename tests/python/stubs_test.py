@@ -28,11 +28,15 @@ def test_a_type_checker_sees_the_names_and_the_results(tmp_path):
     program = tmp_path / "program.py"
     program.write_text("""
 import jfpx
+import jfpx.mpi
 points = [[0.0, 0.0, 0.0]]
 contacts: jfpx.Contacts = jfpx.find_contacts(points, 1.0)
 rows: jfpx.Rows = jfpx.find_pairs(points, 1.0, output="csr")
 images: jfpx.PeriodicPairs = jfpx.find_pairs(points, 1.0, periodic=(9, 9, None))
 report: jfpx.StepReport = jfpx.World("pile").step()
+ranks: jfpx.mpi.Communicator = jfpx.mpi.Communicator()
+rank: int = ranks.rank
+world = jfpx.World("pile", communicator=ranks)
 """)
     errors, _, status = api.run(["--strict", "--no-incremental", str(program)])
     assert status == 0, errors

@@ -230,6 +230,25 @@ def test_bodies_are_added_changed_and_removed():
         world.state(ball)
 
 
+def test_a_body_gets_another_definition():
+    world = jfpx.World({"bodies": [{**FREE, "velocity": [1, 0, 0]}, FLOOR]})
+    ball, floor = world.bodies
+    world.run(10)
+    fields = world.definition(ball)
+    assert tuple(fields["position"]) == pytest.approx(world.state(ball).position) and fields["mass"] == 1
+    world.replace(ball, fields | {"shape": {"type": "box", "half_extents": [1, 2, 3]}, "mass": 0, "velocity": [0, 0, 0]})
+    assert world.bodies == [ball, floor] and world.mass(ball) == 0
+    assert world.definition(ball)["shape"] == {"type": "box", "half_extents": [1, 2, 3]}
+    before = world.snapshot()
+    for wrong, error in (({"mass": -1}, jfpx.InvalidScene), ({"weight": 1}, jfpx.InvalidScene)):
+        with pytest.raises(error, match=next(iter(wrong))):
+            world.replace(ball, fields | wrong)
+    assert world.snapshot() == before
+    world.remove(ball)
+    with pytest.raises(jfpx.InvalidArgument):
+        world.replace(ball, fields)
+
+
 def test_a_body_does_not_move_along_and_about_locked_axes():
     world = jfpx.World({"bodies": [{**FREE, "motion_locks": {"linear_x": True, "angular_z": True}}]})
     body = world.bodies[0]
@@ -268,6 +287,32 @@ def test_contact_forces_carry_the_weight():
     world.remove(world.bodies[0])
     with pytest.raises(jfpx.ConcurrentUse):
         world._core.write_forces(*forces)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_debug_lines_are_on_the_surfaces(dtype):
+    world = jfpx.World({"bodies": [{**FREE, "position": [1, 2, 3]},
+                                   {"shape": {"type": "box", "half_extents": [1, 2, 3]}, "position": [9, 0, 0],
+                                    "mass": 0}]}, dtype=dtype)
+    ball, box = world.bodies
+    lines, colors = world.debug_lines(filter=lambda body: body == ball)
+    assert lines.dtype == dtype and lines.shape[1:] == (2, 3) and len(lines) >= 24
+    np.testing.assert_allclose(np.linalg.norm(lines - [1, 2, 3], axis=2), 0.5, rtol=1e-5)
+    assert colors.dtype == np.uint8 and colors.shape == (len(lines), 3)
+    edges = world.debug_lines(region=([8, -1, -1], [10, 1, 1])).lines
+    assert len(edges) == 12
+    np.testing.assert_allclose(np.abs(edges - [9, 0, 0]), np.broadcast_to([1, 2, 3], (12, 2, 3)), rtol=1e-6)
+    assert len(world.debug_lines().lines) == len(lines) + len(edges)
+    assert len(world.debug_lines(shapes=False).lines) == 0
+    assert len(world.debug_lines(shapes=False, axes=True).lines) == 6
+    with pytest.raises(jfpx.InvalidArgument, match="circle_points is 3"):
+        world.debug_lines(circle_points=3)
+    with pytest.raises(jfpx.InvalidArgument, match="axis_length"):
+        world.debug_lines(axis_length=0)
+    with pytest.raises(jfpx.InvalidArgument, match="region"):
+        world.debug_lines(region=([1, 0, 0], [0, 1, 1]))
+    with pytest.raises(ZeroDivisionError):
+        world.debug_lines(filter=lambda body: 1 / 0)
 
 
 def test_filters_decide_which_bodies_touch():

@@ -10,7 +10,8 @@ foreach(suffix IN ITEMS "" "_f64")
   # Quoted, because a shell runs the command.
   target_compile_definitions(tool_test${suffix} PRIVATE
     "JFPX_TOOL_PATH=\"\\\"$<TARGET_FILE:jfpx_tool${suffix}>\\\"\""
-    JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>)
+    JFPX_HAS_BULLET=$<BOOL:${JFPX_HAS_BULLET}>
+    JFPX_HAS_MPI=$<BOOL:${JFPX_HAS_MPI}>)
   target_compile_definitions(scene_file_test${suffix} PRIVATE JFPX_HAS_ASSIMP=$<BOOL:${JFPX_HAS_ASSIMP}>)
 endforeach()
 

@@ -102,6 +102,8 @@ TEST(Tool, BadUsageIsStatusTwo) {
   expect_fails("run pile --trajectory run.xyz --trajectory-every 0", 2,
                "--trajectory-every is 0; it must be at least 1");
   expect_fails("run flight --trajectory run.xyz", 2, "--trajectory requires a scene");
+  expect_fails("run flight --states run.npy", 2, "--states requires a scene");
+  expect_fails("run pile --states /nowhere/run.npy", 2, "/nowhere/run.npy: can't be written");
   expect_fails("scenes --export", 2, "SCENE");
   expect_fails("scenes --spheres 5", 2, "SCENE");
 }
@@ -124,6 +126,30 @@ TEST(Tool, OptionsThatWouldDoNothingAreRefused) {
                  "--substeps requires --resolver soft-step; resolver is worst-first");
   }
 }
+
+#if !defined(_WIN32)  // a shell that sets variables
+TEST(Tool, SeveralProcessesDoNotDoTheSame) {
+  const auto started = [](const std::string& environment, const std::string& arguments) {
+    return test::run_process(environment + " " JFPX_TOOL_PATH " " + arguments + " 2>&1");
+  };
+  for (const std::string several : {"OMPI_COMM_WORLD_SIZE=3", "PMI_SIZE=2", "PMIX_RANK=1",
+                                    "PMIX_RANK=0 SLURM_STEP_NUM_TASKS=2"}) {
+    const ProcessResult result = started(several, "scenes");
+    EXPECT_EQ(result.status, 2) << several;
+    EXPECT_THAT(result.output, HasSubstr("jfpx scenes runs as one process")) << several;
+#if !JFPX_HAS_MPI
+    const ProcessResult run = started(several, "run pile --steps 1");
+    EXPECT_EQ(run.status, 2) << several;
+    EXPECT_THAT(run.output, HasSubstr("this program is built without MPI")) << several;
+#endif
+  }
+  for (const std::string one :
+       {"OMPI_COMM_WORLD_SIZE=1 PMIX_RANK=0", "PMI_SIZE=1", "PMIX_RANK=0 SLURM_STEP_NUM_TASKS=1"}) {
+    EXPECT_EQ(started(one, "scenes").status, 0) << one;
+    EXPECT_EQ(started(one, "run pile --steps 1").status, 0) << one;
+  }
+}
+#endif
 
 #if !defined(_WIN32)  // devices in the file system
 TEST(Tool, OutputThatIsLostIsAnError) {

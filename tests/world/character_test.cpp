@@ -424,22 +424,41 @@ TEST(Character, RidesALift) {
   expect_near_vector(player.state.velocity, velocity + Vec3{0, 5, 0}, 1e-4_r);
 }
 
-TEST(Character, RidesATurntable) {
-  BodyDef table = kinematic_box({4, 0.1_r, 4}, {1, -0.1_r, 0}, {});
-  table.angular_velocity = {0, 1, 0};
-  World world = query_world({table});
-  Player player({3, 0, 0});
+/// Walks in place for 300 steps on a surface that rotates about a point with 1 rad/s, and expects
+/// the circle of radius 2 m about it.
+void expect_ride(World& world, Player& player, const Vec3& centre, double tolerance) {
   player.walk(world, 0, 0);
   for (int n = 1; n <= 300; ++n) {
     world.step();
     player.walk(world, 0, 0);
     ASSERT_TRUE(player.stands());
     const double angle = n * static_cast<double>(kDt);
-    ASSERT_NEAR(player.feet().x, 1 + 2 * std::cos(angle), 2e-3) << n;
-    ASSERT_NEAR(player.feet().z, -2 * std::sin(angle), 2e-3) << n;
+    ASSERT_NEAR(player.feet().x, static_cast<double>(centre.x) + 2 * std::cos(angle), tolerance)
+        << n;
+    ASSERT_NEAR(player.feet().z, static_cast<double>(centre.z) - 2 * std::sin(angle), tolerance)
+        << n;
   }
+}
+
+TEST(Character, RidesATurntable) {
+  BodyDef table = kinematic_box({4, 0.1_r, 4}, {1, -0.1_r, 0}, {});
+  table.angular_velocity = {0, 1, 0};
+  World world = query_world({table});
+  Player player({3, 0, 0});
+  expect_ride(world, player, {1, 0, 0}, 2e-3);
   EXPECT_LT(length(player.state.velocity), 1e-4_r);
   EXPECT_NEAR(length(player.state.ground_velocity), 2, 1e-3);
+}
+
+/// The surface with velocity v and angular velocity w rotates about the point at which both cancel.
+TEST(Character, RidesAConveyor) {
+  BodyDef belt = kinematic_box({6, 0.1_r, 6}, {1, -0.1_r, 0}, {1, 0, 0});
+  belt.angular_velocity = {0, 1, 0};
+  belt.motion_locks = kFixedPose;
+  World world = query_world({belt});
+  Player player({3, 0, -1});
+  expect_ride(world, player, {1, 0, -1}, 0.06);
+  EXPECT_NEAR(length(player.state.ground_velocity), 2, 0.04);
 }
 
 TEST(Character, IsPushedByDoorsThatClose) {
@@ -654,6 +673,11 @@ TEST(Character, IsNotPushedIntoFixedBodiesByThoseThatMove) {
                              {draw(-7, 7), draw(0, 3), draw(-7, 7)});
     box.kinematic = n % 3 == 1;
     if (n % 3 == 2) box.mass = 5;
+    if (n % 6 == 0) {  // a conveyor is fixed
+      box.kinematic = true;
+      box.motion_locks = kFixedPose;
+      box.velocity = {0.5_r, 0, 0.3_r};
+    }
     bodies.push_back(box);
   }
   World world = query_world(bodies);

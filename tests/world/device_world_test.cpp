@@ -88,9 +88,12 @@ Scene random_scene(Random* random) {
     if (random->below(8) == 0) def.rolling_friction = 0.05_r;
     if (random->below(8) == 0) def.sensor = true;
     if (random->below(8) == 0) def.filter = {.category = 2, .mask = 0xfffffff1u};
-    if (def.mass == 0 && std::holds_alternative<Sphere>(def.shape) && random->below(2) == 0) {
+    const bool is_wall =
+        std::holds_alternative<HalfSpace>(def.shape) || std::holds_alternative<Plane>(def.shape);
+    if (def.mass == 0 && !is_wall && random->below(2) == 0) {
       def.kinematic = true;
-      def.velocity = {0.2_r, 0, 0};
+      def.velocity = random->uniform_in_box({-0.3_r, -0.3_r, -0.3_r}, {0.3_r, 0.3_r, 0.3_r});
+      if (random->below(2) == 0) def.angular_velocity = {0.3_r, -0.5_r, 0.2_r};
     }
     scene.bodies.push_back(def);
   }

@@ -343,6 +343,25 @@ TEST_P(OutOfMemoryInAWorld, AFailedChangeOfBodiesChangesNothing) {
   EXPECT_GE(failures, GetParam() == Solver::soft_step ? 5 : 0);
 }
 
+TEST_P(OutOfMemoryInAWorld, AFailedReplacementChangesNothing) {
+  const Scene scene = scene_with_ignored_pairs(GetParam());
+  const auto make = [&] { return make_world(scene, kSettings[0], 2, false); };
+  BodyDef def = ball({0, 1, 0});
+  def.shape = Compound{{{Sphere{1}, {1, 0, 0}}, {Sphere{1}, {-1, 0, 0}}}};
+  def.inertia = diagonal({1, 2, 2});
+  const auto replace = [&](World& world) { world.replace(world.bodies()[2], def); };
+  World undisturbed = make();
+  replace(undisturbed);
+  const auto expected = follow(undisturbed, 2);
+  const std::size_t failures = with_every_failure([&](std::size_t k, Shortage shortage) {
+    World world = make();
+    if (runs_out(k, shortage, [&] { replace(world); })) replace(world);
+    EXPECT_TRUE(follow(world, 2) == expected) << k;
+    return FailingNew::failed() && !testing::Test::HasFailure();
+  });
+  EXPECT_GT(failures, 2u);
+}
+
 TEST_P(OutOfMemoryInAWorld, AFailedConstructionLeaksNothing) {
   const Scene scene = dense_scene(2, GetParam());
   for (const WorldSettings& settings : kSettings) {

@@ -53,7 +53,7 @@ constexpr Pin kSoftStepPins[] = {
     {"polydisperse", 100, 60, 0xd62f77d75c6f7d7eu, 0x367a150899394731u},
     {"mixed", 40, 150, 0x55ba1c236c913c6eu, 0x1684125c518b8420u},
     {"capsules", 20, 200, 0xb07904e024b50ff0u, 0x8e69fe3107a6f3deu},
-    {"terrain", 20, 200, 0x446c601086c8cea6u, 0x1e8985a54049248cu},
+    {"terrain", 20, 200, 0x446c601086c8cea6u, 0x68330b32cfe2a22bu},
     {"ragdolls", 9, 200, 0x4d7019ebf9b31018u, 0xb2734726ae85fe07u},
     {"bridge", 30, 200, 0x8c8475076f086b9bu, 0x1b8c82eab2d0a6aau},
     // Enough for several threads to solve the contacts of a color.

@@ -35,7 +35,7 @@ inline Scene random_room(Random* random) {
 class Change {
  public:
   Change(Random* random, double time)
-      : action_(random->below(17)),
+      : action_(random->below(18)),
         i_(random->below(1000)),
         j_(random->below(1000)),
         def_(random_body(random, 3)),
@@ -73,10 +73,23 @@ class Change {
       }
     }
     if (action_ == 16) world->set_motion_locks(id, locks_);
+    if (action_ == 17) replace(world, id);
     if (action_ >= 12 && action_ < 16) change_joints(world, id);
   }
 
  private:
+  /// Another shape at the same place, or a mass of 0 instead of a mass, or a body at another place.
+  void replace(World* world, BodyId id) const {
+    BodyDef def = world->definition(id);
+    if (j_ % 3 == 0) def.shape = def_.shape;
+    if (j_ % 3 == 1) def.mass = def.mass > 0 ? Real(0) : Real(2);
+    if (j_ % 3 == 2) def = def_;
+    try {
+      world->replace(id, def);
+    } catch (const Error&) {
+      // A wall with a mass, or a joint without a movable body. Both worlds refuse it.
+    }
+  }
   void change_joints(World* world, BodyId id) const {
     const std::span<const JointId> joints = world->joints();
     Joint joint = joint_;

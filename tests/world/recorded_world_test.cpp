@@ -83,7 +83,7 @@ void change(RecordedWorld& world, Random* random) {
   const Real number = random->uniform(0.1_r, 0.9_r);
   const bool movable = world.world().mass(id) > 0;
   const std::span<const ForceId> forces = world.world().forces();
-  switch (random->below(23)) {
+  switch (random->below(24)) {
     case 0:
       world.add(random_body(random, 3));
       break;
@@ -148,6 +148,12 @@ void change(RecordedWorld& world, Random* random) {
         world.set_motion_locks(id, random_locks(random));
       }
       break;
+    case 22: {
+      BodyDef def = world.world().definition(id);
+      def.shape = random_body(random, 3).shape;
+      if (!(def.mass > 0) || has_volume(def.shape)) world.replace(id, def);
+      break;
+    }
     case 16:
       world.add_force(random_force(random, bodies));
       break;

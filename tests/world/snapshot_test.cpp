@@ -562,7 +562,7 @@ TEST(SnapshotsOfLocks, OfBadContentAreAnErrorOrAWorldThoughTheChecksumIsRight) {
       world, world.snapshot().bytes.size() - kBytesOfLocks - kChecksum, &accepted);
   EXPECT_GT(accepted, 20u);
   for (const char* reason :
-       {"a body of mass 0 has locked axes, or a body moves along or about a locked axis",
+       {"an immovable body has locked axes, or a body moves along or about a locked axis",
         "a truth value is neither 0 nor 1"}) {
     EXPECT_TRUE(complaints.contains(std::string("the snapshot is corrupt: ") + reason)) << reason;
   }

@@ -7,6 +7,7 @@ jfpx_add_test(world_parts_test THESIS INTERNAL SOURCES
   world/neighbor_list_test.cpp
   world/query_tree_test.cpp
   world/swept_bounds_test.cpp)
+jfpx_add_test(ranks_test INTERNAL SOURCES world/ranks_test.cpp)
 jfpx_add_test(device_world_test THESIS INTERNAL SOURCES world/device_world_test.cpp)
 if(JFPX_HAS_CUDA)
   set(cuda_runtime CUDA::cudart_static)
@@ -34,6 +35,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/contact_events_test.cpp
   world/contact_forces_test.cpp
   world/contact_generator_test.cpp
+  world/conveyor_test.cpp
   world/cylinder_world_test.cpp
   world/erratum_test.cpp
   world/filter_test.cpp
@@ -47,7 +49,9 @@ jfpx_add_test(world_test THESIS SOURCES
   world/mixed_test.cpp
   world/motion_locks_test.cpp
   world/motion_test.cpp
+  world/debug_draw_test.cpp
   world/property_test.cpp
+  world/replace_test.cpp
   world/query_test.cpp
   world/recorded_world_test.cpp
   world/recording_test.cpp

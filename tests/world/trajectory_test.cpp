@@ -6,6 +6,7 @@
 #include "src/base/file.hpp"
 #include "src/scenes/scenes.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/support/thread_ranks.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -330,7 +331,63 @@ TEST(Trajectory, ErrorsNameTheFile) {
   EXPECT_EQ(folder.entries(), 1u);
 }
 
+TEST(StatesFile, IsAnArrayOfNumPy) {
+  const TemporaryFolder folder;
+  World world(scene_of_shapes());
+  world.remove(world.bodies()[1]);
+  for (int i = 0; i < 10; ++i) world.step();
+  write_states(world, folder.file("states.npy"));
+  const std::string bytes = read_file(folder.file("states.npy"));
+  const std::string real = sizeof(Real) == 4 ? "'<f4'" : "'<f8'";
+  const std::string text = "{'descr': [('index', '<u4'), ('generation', '<u4'), ('position', " +
+                           real + ", (3,)), ('orientation', " + real + ", (4,)), ('velocity', " +
+                           real + ", (3,)), ('angular_velocity', " + real +
+                           ", (3,))], 'fortran_order': False, 'shape': (" +
+                           std::to_string(world.bodies().size()) + ",), }";
+  ASSERT_GT(bytes.size(), text.size() + 10);
+  EXPECT_EQ(bytes.substr(0, 8), std::string("\x93NUMPY\x01\0", 8));
+  EXPECT_EQ(bytes.substr(10, text.size()), text);
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(bytes[i]); };
+  const std::size_t header = 10u + byte(8) + 256u * byte(9), record = 8 + 13 * sizeof(Real);
+  EXPECT_EQ(header % 4096, 0u);
+  EXPECT_EQ(bytes[header - 1], '\n');
+  ASSERT_EQ(bytes.size(), header + world.bodies().size() * record);
+  for (std::size_t i = 0; i < world.bodies().size(); ++i) {
+    BodyId id;
+    BodyState s;
+    const char* at = bytes.data() + header + i * record;
+    const auto read = [&](auto*... values) {
+      ((std::memcpy(values, at, sizeof *values), at += sizeof *values), ...);
+    };
+    read(&id.index, &id.generation, &s.position.x, &s.position.y, &s.position.z, &s.orientation.w,
+         &s.orientation.x, &s.orientation.y, &s.orientation.z, &s.velocity.x, &s.velocity.y,
+         &s.velocity.z, &s.angular_velocity.x, &s.angular_velocity.y, &s.angular_velocity.z);
+    EXPECT_EQ(id, world.bodies()[i]);
+    EXPECT_EQ(s, world.states()[i]);
+  }
+  EXPECT_EQ(folder.entries(), 1u);
+  try {
+    write_states(world, folder.file("none/states.npy"));
+    ADD_FAILURE();
+  } catch (const FileError& error) {
+    EXPECT_THAT(error.what(), StartsWith(folder.file("none/states.npy") + ": can't be written"));
+  }
+}
+
 #if !defined(_WIN32)
+TEST(StatesFile, OnAFullDiskIsAnErrorOnAllRanksAndLeavesNoFile) {
+  const TemporaryFolder folder;
+  const Scene scene = scenes::make("pile", {.spheres = 1000});
+  const FullDisk full;
+  EXPECT_THROW(write_states(World(scene), folder.file("states.npy")), FileError);
+  ThreadRanks::run(3, [&](const std::shared_ptr<Communicator>& communicator) {
+    World world(scene, {.communicator = communicator});
+    world.step();
+    EXPECT_THROW(write_states(world, folder.file("states.npy")), FileError);
+  });
+  EXPECT_EQ(folder.entries(), 0u);
+}
+
 TEST(Trajectory, OnAFullDiskIsAnErrorAndLeavesNoFile) {
   for (const std::string extension : {"xyz", "pvd"}) {
     const TemporaryFolder folder;

@@ -13,7 +13,7 @@ if("bullet" IN_LIST FEATURES)
 endif()
 vcpkg_cmake_configure(
   SOURCE_PATH "${SOURCE_PATH}"
-  OPTIONS ${cuda} ${bullet} -DJFPX_VIEWER=OFF -DJFPX_TOOL=OFF -DJFPX_EXAMPLES=OFF -DJFPX_TESTS=OFF)
+  OPTIONS ${cuda} ${bullet} -DJFPX_MPI=OFF -DJFPX_VIEWER=OFF -DJFPX_TOOL=OFF -DJFPX_EXAMPLES=OFF -DJFPX_TESTS=OFF)
 vcpkg_cmake_install()
 vcpkg_cmake_config_fixup(CONFIG_PATH lib/cmake/jfpx)
 vcpkg_fixup_pkgconfig()

@@ -9,6 +9,7 @@
 #include <LinearMath/btQuickprof.h>
 
 #include <algorithm>
+#include <iterator>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -44,8 +45,10 @@ void ConstraintSolver::Impl::prefetch_block(std::uint32_t block) const {
 
 void ConstraintSolver::Impl::set_up_block(std::uint32_t block) {
   const std::size_t lanes = solver.lanes();
-  alignas(64) Real inputs[rows::kInputFields * rows::kMaxLanes] = {};
-  alignas(64) Real second[3 * rows::kMaxLanes];
+  // Not on the stack: that of the caller may have little more than Bullet needs.
+  alignas(64) static thread_local Real inputs[rows::kInputFields * rows::kMaxLanes];
+  alignas(64) static thread_local Real second[3 * rows::kMaxLanes];
+  std::fill_n(inputs, std::size(inputs), Real(0));
   const std::uint32_t* contacts = solver.contacts_of(block);
   std::size_t used = 0;
   for (; used < lanes && contacts[used] != cpu::RowSolver::kNoContact; ++used) {

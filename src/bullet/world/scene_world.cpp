@@ -386,17 +386,28 @@ struct SceneWorld::Impl {
     if (!filtered) return world->addRigidBody(body);
     world->addRigidBody(body, static_cast<int>(filter.category), static_cast<int>(filter.mask));
   }
-  /// Moves kinematic bodies like the native engine; Bullet derives velocities from the
-  /// displacement.
+  /// Moves kinematic bodies like the native engine; Bullet derives velocities from the displacement
+  /// since the interpolated pose. That of a conveyor is set back by its motion along and about
+  /// locked axes.
   void move_kinematic_bodies(Real dt) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const BodyDef& def = scene.bodies[i];
       if (!def.kinematic) continue;
-      const btTransform& pose = bodies[i]->getWorldTransform();
-      bodies[i]->setWorldTransform(
-          btTransform(to_bullet(detail::integrated_orientation(from_bullet(pose.getRotation()),
-                                                               def.angular_velocity, dt)),
-                      pose.getOrigin() + to_bullet(def.velocity * dt)));
+      const btTransform pose = bodies[i]->getWorldTransform();
+      const auto moved = [&](const Vec3& velocity, const Vec3& angular_velocity) {
+        const btVector3 origin = pose.getOrigin() + to_bullet(velocity * dt);
+        // Conversions of the rotation would add their rounding errors in each step.
+        if (angular_velocity == Vec3{}) return btTransform(pose.getBasis(), origin);
+        return btTransform(to_bullet(detail::integrated_orientation(from_bullet(pose.getRotation()),
+                                                                    angular_velocity, dt)),
+                           origin);
+      };
+      const Vec3 free = detail::free_linear(def.motion_locks, def.velocity);
+      const Vec3 turning = detail::free_angular(def.motion_locks, def.angular_velocity);
+      bodies[i]->setWorldTransform(moved(free, turning));
+      if (def.motion_locks == MotionLocks{}) continue;
+      bodies[i]->setInterpolationWorldTransform(
+          moved(free - def.velocity, turning - def.angular_velocity));
     }
   }
   ~Impl() {

@@ -18,7 +18,7 @@ constexpr std::size_t kMatchesPerChunk = 256;
 }  // namespace
 
 void ContactCache::match(const MatchedBodies& bodies, bool any_rolls, const JointView& joints,
-                         ThreadPool* pool) {
+                         ThreadPool* pool, Domain* domain) {
   reserve(bodies.inverse_mass.size());
   drop_forgotten();
   ContactSet& now = current_;
@@ -30,7 +30,7 @@ void ContactCache::match(const MatchedBodies& bodies, bool any_rolls, const Join
     now.rolling_impulses = {};
   }
   resize_geometric(&now.colors, now.size());
-  coloring_.start(bodies.inverse_mass.size(), pool);
+  coloring_.start(bodies.inverse_mass.size(), pool, domain);
   parallel_for(pool, spheres, chunk_size(spheres, 32, kMatchesPerChunk),
                [&](std::size_t first, std::size_t last) {
                  match_spheres(static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last),
@@ -41,7 +41,7 @@ void ContactCache::match(const MatchedBodies& bodies, bool any_rolls, const Join
                  match_manifolds(static_cast<std::uint32_t>(first),
                                  static_cast<std::uint32_t>(last), bodies);
                });
-  match_joints(joints, bodies);
+  match_joints(joints, bodies, domain);
   coloring_.finish(
       [&](std::uint32_t i, std::uint8_t color) {
         if (i < now.size()) {
@@ -50,10 +50,11 @@ void ContactCache::match(const MatchedBodies& bodies, bool any_rolls, const Join
           joints.now[i - now.size()].color = color;
         }
       },
-      pool);
+      pool, domain);
 }
 
-void ContactCache::match_joints(const JointView& joints, const MatchedBodies& bodies) {
+void ContactCache::match_joints(const JointView& joints, const MatchedBodies& bodies,
+                                const Domain* domain) {
   GreedyColoring::Portion uncolored(&coloring_);
   for (std::uint32_t joint = 0; joint < joints.count; ++joint) {
     KeptJoint& now = joints.now[joint];
@@ -62,6 +63,8 @@ void ContactCache::match_joints(const JointView& joints, const MatchedBodies& bo
     const ContactKey key = joints.key(joint);
     if (key.b == kWorld || !bodies.are_movable(key)) {
       now.color = kFixedColor;
+    } else if (domain != nullptr && !domain->takes_part(key.a, key.b)) {
+      continue;
     } else if (const bool is_inner = bodies.are_in_one_block(key);
                keeps_color(now.color, is_inner)) {
       coloring_.keep(key.a, key.b, static_cast<std::uint8_t>(now.color));

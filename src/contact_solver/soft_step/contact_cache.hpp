@@ -50,8 +50,9 @@ class ContactCache {
   /// @param bodies of the step; their arrays are used during the call
   /// @param any_rolls whether a body has rolling or spinning friction
   /// @param pool null: in the calling thread
-  void match(const MatchedBodies& bodies, bool any_rolls, const JointView& joints,
-             ThreadPool* pool);
+  /// @param domain null: a single rank. Otherwise, only joints of bodies of this rank are matched.
+  void match(const MatchedBodies& bodies, bool any_rolls, const JointView& joints, ThreadPool* pool,
+             Domain* domain = nullptr);
   /// Completes the step: the current contacts become the last ones. Does not allocate.
   void commit() noexcept { std::swap(last_, current_); }
   /// Reserves memory for forget() of bodies with indices below `bodies`. @throws std::bad_alloc
@@ -71,7 +72,7 @@ class ContactCache {
  private:
   void match_spheres(std::uint32_t first, std::uint32_t last, const MatchedBodies& bodies);
   void match_manifolds(std::uint32_t first, std::uint32_t last, const MatchedBodies& bodies);
-  void match_joints(const JointView& joints, const MatchedBodies& bodies);
+  void match_joints(const JointView& joints, const MatchedBodies& bodies, const Domain* domain);
   void keep(std::uint32_t i, bool is_kept, std::uint32_t before, const MatchedBodies& bodies,
             GreedyColoring::Portion* uncolored);
 

@@ -1,9 +1,9 @@
 /// The kinds of rows of a soft step, and the groups in which a sweep solves them.
 #pragma once
 
+#include "src/contact_solver/soft_step/colors.hpp"
 #include "src/contact_solver/soft_step/distance_row.hpp"
 #include "src/contact_solver/soft_step/frame_row.hpp"
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/contact_solver/soft_step/manifold_row.hpp"
 #include "src/contact_solver/soft_step/sphere_row.hpp"
 

@@ -107,6 +107,15 @@ void BodyStore::count_body(std::uint32_t i) noexcept {
   note_mobile(i);
 }
 
+void BodyStore::uncount_body(std::uint32_t i) noexcept {
+  if (!immovable(i)) mobile_.invalidate();
+  if (movable(i)) --movable_count_;
+  if (kinematic(i)) --kinematic_count_;
+  if (sensor(i)) --sensor_count_;
+  if (rolls(i)) --rolling_count_;
+  if (has_locks(i)) --locked_count_;
+}
+
 std::span<const std::uint32_t> BodyStore::mobile() const noexcept {
   return mobile_.get([this](std::vector<std::uint32_t>* bodies) {
     bodies->clear();  // has the capacity of the slots
@@ -124,36 +133,49 @@ void BodyStore::note_mobile(std::uint32_t i) noexcept {
   is_last ? bodies->push_back(i) : mobile_.invalidate();
 }
 
-BodyId BodyStore::add(const BodyDef& def) {
-  Shape shape = normalized(def.shape);  // may throw, hence before any change
-  std::map<std::uint32_t, Mat3> given;
-  if (def.inertia && def.mass > 0) given[0] = {};
+BodyStore::Replacement BodyStore::prepare(std::uint32_t i, const BodyDef& def) {
+  Replacement prepared{normalized(def.shape), {}};
+  if (def.inertia && def.mass > 0) prepared.inertia[i] = {};
   if (needs_inertia_arrays(def.shape, def.mass, def.kinematic, def.inertia.has_value(),
                            def.motion_locks)) {
     make_inertia_arrays();
   }
+  return prepared;
+}
+
+BodyId BodyStore::add(const BodyDef& def) {
+  Replacement prepared = prepare(next_index(), def);  // may throw, hence before any change
   if (pool_.is_full()) add_slot();
   const BodyId id = pool_.add();  // from here on nothing allocates
-  const std::uint32_t i = id.index;
-  if (!given.empty()) {
-    auto node = given.extract(given.begin());
-    node.key() = i;
-    given_inertia_.insert(std::move(node));
-  }
+  moving.place[id.index] = soft_step::kNoPlace;
+  put(id.index, def, std::move(prepared));
+  return id;
+}
 
+void BodyStore::replace(std::uint32_t i, const BodyDef& def, Replacement prepared) noexcept {
+  const bool was_movable = movable(i);
+  if (!was_movable) ++fixed_version_;
+  uncount_body(i);
+  set_filter(i, {});
+  given_inertia_.erase(i);
+  put(i, def, std::move(prepared));
+  if (movable(i) != was_movable) moving.place[i] = soft_step::kNoPlace;
+}
+
+/// Sets all columns of a body but its place in the partition. Does not allocate.
+void BodyStore::put(std::uint32_t i, const BodyDef& def, Replacement prepared) noexcept {
+  given_inertia_.merge(prepared.inertia);
   each_given(moving, properties_, host_, given_inertia_, def, PutValue{i});
-  host_.shape[i] = std::move(shape);
+  host_.shape[i] = std::move(prepared.shape);
   if (!sleep_.enabled) properties_.can_sleep[i] = 0;
-  if (!(def.mass > 0)) properties_.motion_locks[i] = {};
+  if (!(def.mass > 0) && !def.kinematic) properties_.motion_locks[i] = {};
   derive_properties(i);
   compute_inertia(i, def.inertia);
   moving.force[i] = moving.torque[i] = moving.last_acceleration[i] = {};
   moving.mean_motion[i] = moving.rest_time[i] = 0;
   moving.awake[i] = 0;
-  moving.place[i] = soft_step::kNoPlace;
   if (!movable(i)) ++fixed_version_;
   set_state(i, {def.position, def.orientation, def.velocity, def.angular_velocity});
-  return id;
 }
 
 void BodyStore::set_mass(std::uint32_t i, Real mass) {
@@ -222,14 +244,16 @@ void BodyStore::set_tensor(std::uint32_t i, const Mat3& tensor) {
 }
 
 void BodyStore::set_motion_locks(std::uint32_t i, const MotionLocks& locks) {
-  if (!movable(i)) return;
-  if (needs_inertia_arrays(host_.shape[i], host_.mass[i], false, inertia_given(i), locks)) {
+  if (immovable(i)) return;
+  const bool moves_freely = movable(i);
+  if (moves_freely &&
+      needs_inertia_arrays(host_.shape[i], host_.mass[i], false, inertia_given(i), locks)) {
     make_inertia_arrays();
   }
   if (has_locks(i)) --locked_count_;
   properties_.motion_locks[i] = locks;
   if (has_locks(i)) ++locked_count_;
-  if (has_inertia_arrays_) set_tensor(i, inertia(i));
+  if (moves_freely && has_inertia_arrays_) set_tensor(i, inertia(i));
 }
 
 void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
@@ -241,13 +265,8 @@ void BodyStore::set_damping(std::uint32_t i, Real linear, Real angular) {
 
 void BodyStore::remove(BodyId id) noexcept {
   if (!movable(id.index)) ++fixed_version_;
-  if (!immovable(id.index)) mobile_.invalidate();
   pool_.remove(id);
-  if (movable(id.index)) --movable_count_;
-  if (kinematic(id.index)) --kinematic_count_;
-  if (sensor(id.index)) --sensor_count_;
-  if (rolls(id.index)) --rolling_count_;
-  if (has_locks(id.index)) --locked_count_;
+  uncount_body(id.index);
   moving.awake[id.index] = 0;
   given_inertia_.erase(id.index);
   ignored_.erase_body(id.index);
@@ -285,10 +304,11 @@ void BodyStore::set_velocities(std::uint32_t i, const BodyState& state) {
   wake(i);
 }
 
-/// Replaces the velocities, except along and about locked axes.
+/// Replaces the velocities, of a movable body except along and about locked axes.
 void BodyStore::put_velocities(std::uint32_t i, const BodyState& state) {
-  moving.velocity[i] = detail::free_linear(motion_locks(i), state.velocity);
-  moving.angular_velocity[i] = detail::free_angular(motion_locks(i), state.angular_velocity);
+  const MotionLocks locks = movable(i) ? motion_locks(i) : MotionLocks{};
+  moving.velocity[i] = detail::free_linear(locks, state.velocity);
+  moving.angular_velocity[i] = detail::free_angular(locks, state.angular_velocity);
 }
 
 void BodyStore::set_filter(std::uint32_t i, const CollisionFilter& filter) noexcept {

@@ -36,6 +36,18 @@ class BodyStore {
   /// @param def must have passed validation
   /// @throws std::bad_alloc; the store is then unchanged
   BodyId add(const BodyDef& def);
+  /// What replace() needs memory for.
+  struct Replacement {
+    Shape shape;
+    std::map<std::uint32_t, Mat3> inertia;  ///< of the body, if its inertia is given
+  };
+  /// @param def must have passed validation @throws std::bad_alloc; the store is then unchanged
+  Replacement prepare(std::uint32_t body, const BodyDef& def);
+  /// Gives a body another definition. Its id and its ignored pairs remain.
+  /// @param prepared result of prepare() for both arguments
+  void replace(std::uint32_t body, const BodyDef& def, Replacement prepared) noexcept;
+  /// The body in the form that add() accepts.
+  BodyDef definition(std::uint32_t body) const;
   /// The index of the body that add() adds next.
   std::uint32_t next_index() const noexcept { return pool_.next_index(); }
   /// @param id of a body in the store
@@ -187,9 +199,10 @@ class BodyStore {
   void for_each_array(const Visit& visit);
   void resize_slots(std::size_t slots);
   void add_slot();
+  void put(std::uint32_t body, const BodyDef& def, Replacement prepared) noexcept;
   void derive_properties(std::uint32_t body) noexcept;
-  BodyDef definition(std::uint32_t body) const;
   void count_body(std::uint32_t body) noexcept;
+  void uncount_body(std::uint32_t body) noexcept;
   void note_mobile(std::uint32_t body) noexcept;
   static bool needs_inertia_arrays(const Shape& shape, Real mass, bool kinematic,
                                    bool inertia_given, const MotionLocks& locks);

@@ -59,6 +59,16 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   JFPX_HD bool keeps_position(std::uint32_t i) const {
     return any_locks && detail::all_linear(motion_locks[i]);
   }
+  /// Whether the body is kinematic and its pose does not follow its velocities along or about some
+  /// axes: its surface moves, as that of a conveyor belt or of a turntable.
+  JFPX_HD bool is_conveyor(std::uint32_t i) const {
+    return any_locks && is_carrier(i) && !(motion_locks[i] == MotionLocks{});
+  }
+  /// Angular velocity with which the orientation changes [rad/s].
+  JFPX_HD Vec3 turning(std::uint32_t i) const {
+    return any_locks ? detail::free_angular(motion_locks[i], angular_velocity[i])
+                     : angular_velocity[i];
+  }
   /// The part of an acceleration or a motion that the locks of a body admit.
   JFPX_HD Vec3 admitted(std::uint32_t i, const Vec3& motion) const {
     return any_locks ? detail::free_linear(motion_locks[i], motion) : motion;
@@ -101,7 +111,7 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
   JFPX_HD Vec3 predicted_motion(std::uint32_t i) const {
     if (awake[i] == 0) return {};
     const Vec3 gained = movable(i) ? acceleration_of_step(i) : Vec3{};
-    const Vec3 motion = add_scaled(velocity[i], gained, dt) * dt;
+    const Vec3 motion = admitted(i, add_scaled(velocity[i], gained, dt) * dt);
     constexpr Real kFarthest = 2 * kMaxCoordinate;
     const bool stays = absolute(motion.x) <= kFarthest && absolute(motion.y) <= kFarthest &&
                        absolute(motion.z) <= kFarthest;

@@ -104,5 +104,16 @@ void SubShapeTable::update_poses(const BodyStore& store, ThreadPool* pool) {
   for (const SubShape sub_shape : kinematic_) all.update_pose(bodies, sub_shape);
 }
 
+void SubShapeTable::update_poses(const BodyStore& store, std::span<const SubShape> sub_shapes,
+                                 ThreadPool* pool) {
+  const SubShapeView all = view();
+  const BodyView bodies = store.view_without_ids();
+  const std::size_t count = sub_shapes.size();
+  parallel_for(pool, count, chunk_size(count, 64, 1024), [&](std::size_t first, std::size_t last) {
+    for (const SubShape i : sub_shapes.subspan(first, last - first)) all.update_pose(bodies, i);
+  });
+  for (const SubShape sub_shape : kinematic_) all.update_pose(bodies, sub_shape);
+}
+
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -24,6 +24,9 @@ class SubShapeTable {
   /// Updates the poses of all sub-shapes from their bodies, except immovable solids and walls.
   /// @param pool null: in the calling thread
   JFPX_API void update_poses(const BodyStore& bodies, ThreadPool* pool = nullptr);
+  /// The same for some of the sub-shapes before SubShapeRanges::fixed_begin().
+  void update_poses(const BodyStore& bodies, std::span<const SubShape> sub_shapes,
+                    ThreadPool* pool);
 
   /// Valid until set_bodies().
   JFPX_API SubShapeView view();

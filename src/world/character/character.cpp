@@ -5,6 +5,7 @@
 #include <jfpx/error.hpp>
 
 #include "src/scene/scene_validate.hpp"
+#include "src/world/bodies/motion_locks.hpp"
 #include "src/world/character/slide.hpp"
 #include "src/world/queries/query_arguments.hpp"
 
@@ -27,10 +28,6 @@ constexpr Real kTolerance = Real(0.02);
 constexpr int kMoves = 8;   ///< of a character within dt, between hits
 constexpr int kPushes = 8;  ///< out of overlaps
 
-void require(bool valid, const char* name, const std::string& value, const char* range) {
-  if (!valid) throw_invalid_query(name, value, range);
-}
-
 bool is_coordinate(const Vec3& v) {
   return absolute(v.x) <= kMaxCoordinate && absolute(v.y) <= kMaxCoordinate &&
          absolute(v.z) <= kMaxCoordinate;
@@ -39,20 +36,23 @@ bool is_coordinate(const Vec3& v) {
 void validate(const CharacterSettings& s, const CharacterState& state, Real dt) {
   const auto positive = [](Real x) { return x > 0 && is_finite(x); };
   const Real up = length(s.up);
-  require(positive(s.radius), "radius", to_text(s.radius), "positive and finite");
-  require(positive(s.half_height), "half_height", to_text(s.half_height), "positive and finite");
-  require(up > kEpsilon && is_finite(up), "up", to_text(s.up), "finite and longer than epsilon");
-  require(s.max_slope >= 0 && s.max_slope <= Real(1.5), "max_slope", to_text(s.max_slope),
-          "from 0 to 1.5");
-  require(s.step_height >= 0 && is_finite(s.step_height), "step_height", to_text(s.step_height),
-          ">= 0 and finite");
-  require(s.skin > 0 && s.skin < s.radius, "skin", to_text(s.skin),
-          "positive and less than the radius");
-  require(is_coordinate(state.position), "position", to_text(state.position),
-          "between -1e9 and 1e9");
-  require(is_finite(state.velocity), "velocity", to_text(state.velocity), "finite");
-  require(is_finite(state.ground_normal), "ground_normal", to_text(state.ground_normal), "finite");
-  require(positive(dt), "dt", to_text(dt), "positive and finite");
+  require_in_query(positive(s.radius), "radius", to_text(s.radius), "positive and finite");
+  require_in_query(positive(s.half_height), "half_height", to_text(s.half_height),
+                   "positive and finite");
+  require_in_query(up > kEpsilon && is_finite(up), "up", to_text(s.up),
+                   "finite and longer than epsilon");
+  require_in_query(s.max_slope >= 0 && s.max_slope <= Real(1.5), "max_slope", to_text(s.max_slope),
+                   "from 0 to 1.5");
+  require_in_query(s.step_height >= 0 && is_finite(s.step_height), "step_height",
+                   to_text(s.step_height), ">= 0 and finite");
+  require_in_query(s.skin > 0 && s.skin < s.radius, "skin", to_text(s.skin),
+                   "positive and less than the radius");
+  require_in_query(is_coordinate(state.position), "position", to_text(state.position),
+                   "between -1e9 and 1e9");
+  require_in_query(is_finite(state.velocity), "velocity", to_text(state.velocity), "finite");
+  require_in_query(is_finite(state.ground_normal), "ground_normal", to_text(state.ground_normal),
+                   "finite");
+  require_in_query(positive(dt), "dt", to_text(dt), "positive and finite");
 }
 
 /// The rotation of the y axis to a direction.
@@ -121,16 +121,20 @@ class CharacterMover {
 
  private:
   bool is_walkable(const Vec3& normal) const { return dot(normal, up_) >= least_rise_; }
-  bool moves(BodyId id) const { return world_.mass(id) > 0 || world_.awake(id); }
+  bool moves(BodyId id) const {
+    return world_.mass(id) > 0 || (world_.awake(id) && world_.motion_locks(id) != kFixedPose);
+  }
   Vec3 horizontal(const Vec3& v) const { return v - up_ * dot(v, up_); }
   Vec3 feet() const {
     return add_scaled(position_, up_, -(settings_.half_height + settings_.radius));
   }
 
-  /// Moves with the body below, which has moved in the last step with its present velocities.
+  /// Moves with the body below, which has moved in the last step with its present velocities, or
+  /// with the surface of a conveyor.
   void ride() {
     const BodyState body = world_.state(before_.ground_body);
-    const Vec3 arm = feet() - (body.position - body.velocity * dt_);
+    const MotionLocks locks = world_.motion_locks(before_.ground_body);
+    const Vec3 arm = feet() - (body.position - detail::free_linear(locks, body.velocity) * dt_);
     const Quat turn = rotated_by({}, body.angular_velocity * dt_);
     const Vec3 motion = body.velocity * dt_ + (rotate(turn, arm) - arm);
     carrier_ = body.velocity + cross(body.angular_velocity, arm);

@@ -129,6 +129,31 @@ void ContactFinder::set_bodies(const BodyStore& bodies) {
   sub_shapes_.update_poses(bodies);
   broad_phase_->set_spheres(sub_shapes_.bounds());
   fixed_changed_ = true;
+  domain_version_ = 0;
+}
+
+void ContactFinder::set_domain(const Domain* domain) {
+  domain_ = domain;
+  if (domain == nullptr || domain->version() == domain_version_) return;
+  domain_version_ = domain->version();
+  present_.clear();
+  const SubShapeView sub_shapes = sub_shapes_.view();
+  for (SubShape i = 0; i < sub_shapes.ranges.fixed_begin(); ++i) {
+    if (domain->is_present(sub_shapes.body(i))) present_.push_back(i);
+  }
+}
+
+/// The bounds among which the broad phase finds pairs.
+std::span<const SphereInstance> ContactFinder::present_bounds(ThreadPool* pool) {
+  if (domain_ == nullptr) return std::span(swept_).first(sub_shapes_.ranges().fixed_begin());
+  present_bounds_.resize(present_.size());
+  parallel_for(pool, present_.size(), chunk_size(present_.size(), 128, 1024),
+               [&](std::size_t first, std::size_t last) {
+                 for (std::size_t k = first; k < last; ++k) {
+                   present_bounds_[k] = swept_[present_[k]];
+                 }
+               });
+  return present_bounds_;
 }
 
 /// Sets the pointers of swept_bounds_ to the arrays of a search.
@@ -166,17 +191,21 @@ void ContactFinder::sweep_fixed(const Sweep& sweep) {
 void ContactFinder::sweep_bounds(const BodyStore& bodies, Real margin, ThreadPool* pool) {
   start_bounds(bodies, margin);
   if (fixed_changed_) std::ranges::fill(motion_, Vec3{});  // that of immovable bodies
-  const std::span<const std::uint32_t> mobile = bodies.mobile();
+  const std::span<const std::uint32_t> mobile =
+      domain_ == nullptr ? bodies.mobile() : domain_->present();
   parallel_for(pool, mobile.size(), chunk_size(mobile.size(), kFewestItems, kSubShapesPerChunk),
                [&](std::size_t first, std::size_t last) {
                  for (const std::uint32_t i : mobile.subspan(first, last - first)) {
                    motion_[i] = swept_bounds_.bodies.predicted_motion(i);
                  }
                });
-  const std::size_t bounded = sub_shapes_.ranges().fixed_begin();
+  const std::size_t bounded =
+      domain_ == nullptr ? sub_shapes_.ranges().fixed_begin() : present_.size();
   parallel_for(pool, bounded, chunk_size(bounded, kFewestItems, kSubShapesPerChunk),
                [&](std::size_t first, std::size_t last) {
-                 for (auto i = static_cast<SubShape>(first); i < last; ++i) swept_bounds_.sweep(i);
+                 for (auto i = static_cast<SubShape>(first); i < last; ++i) {
+                   swept_bounds_.sweep(domain_ == nullptr ? i : present_[i]);
+                 }
                });
   sweep_fixed([this](SubShape i) { swept_bounds_.sweep(i); });
 }
@@ -195,19 +224,25 @@ void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const S
                                       Part* part) const {
   const BodyView& view = swept_bounds_.bodies;
   const SubShapeView& sub_shapes = swept_bounds_.sub_shapes;
-  for (const SpherePair& pair : pairs) {
+  for (SpherePair pair : pairs) {
+    if (domain_ != nullptr) pair = {present_[pair.a], present_[pair.b]};
     const PairKind kind = swept_bounds_.kind_of(pair.a, pair.b);
     if (kind == PairKind::none) continue;
     if (kind != PairKind::spheres) {
       auto& list = kind == PairKind::general ? part->candidates : part->compounds;
-      list.push_back(ordered(view, sub_shapes, pair.a, pair.b));
+      const Candidate candidate = ordered(view, sub_shapes, pair.a, pair.b);
+      if (detects(candidate.a, candidate.b)) list.push_back(candidate);
       continue;
     }
+    const std::uint32_t a = sub_shapes.body(pair.a), b = sub_shapes.body(pair.b);
+    if (!detects(a, b)) continue;
     const detail::SpeculativeContact c = swept_bounds_.test_spheres(pair.a, pair.b);
     if (!c.found) continue;
-    const std::uint32_t a = sub_shapes.body(pair.a), b = sub_shapes.body(pair.b);
     const bool touch = c.distance <= 0;
     if (view.sensor[a] == 0 && view.sensor[b] == 0) {
+      if (domain_ != nullptr && domain_->is_foreign(b)) {
+        part->crossing.push_back(static_cast<std::uint32_t>(part->spheres.size()));
+      }
       part->spheres.push_back({{a, b}, c.normal, c.distance});
       if (touch) ++part->touching_spheres;
     } else if (touch) {
@@ -221,7 +256,8 @@ void ContactFinder::find_fixed_pairs(SubShape first, SubShape last,
                                      std::vector<Candidate>* candidates) const {
   const FixedTreesView trees = fixed_trees_.view();
   for (SubShape i = first; i < last; ++i) {
-    if (!swept_bounds_.bodies.movable(swept_bounds_.sub_shapes.body(i))) continue;
+    const std::uint32_t body = swept_bounds_.sub_shapes.body(i);
+    if (!swept_bounds_.bodies.movable(body) || !detects(body, body)) continue;
     const auto before = static_cast<std::ptrdiff_t>(candidates->size());
     swept_bounds_.visit_fixed(i, trees, [&](SubShape fixed, std::uint32_t element) {
       candidates->push_back(
@@ -384,13 +420,18 @@ void ContactFinder::hide_points(std::size_t first, Results* results, ThreadPool*
 std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Real margin,
                                                      ThreadPool* pool, const ContactSet& recyclable,
                                                      ContactSet* set, DetectedContacts* detected) {
-  sub_shapes_.update_poses(bodies, pool);
+  if (domain_ == nullptr) {
+    sub_shapes_.update_poses(bodies, pool);
+  } else {
+    sub_shapes_.update_poses(bodies, present_, pool);
+  }
   sweep_bounds(bodies, margin, pool);
   Results results{{&set->spheres}, {&set->manifolds}, {&set->points}, {&detected->contacts}};
   std::size_t touching_spheres = 0;
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
+  Refilled<std::uint32_t> crossing{&crossing_spheres_};
 
-  const auto bounds = std::span(swept_).first(sub_shapes_.ranges().fixed_begin());
+  const std::span<const SphereInstance> bounds = present_bounds(pool);
   const NeighborPairs found = broad_phase_->find_pairs(bounds, pool);
   const auto test_pairs = [&](std::size_t first, std::size_t last, Part* part) {
     found.for_each_touching(bounds, first, last, [&](std::span<const SpherePair> pairs) {
@@ -402,9 +443,14 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
       pool, found.pairs.size(), chunk_size(found.pairs.size(), kFewestItems, kPairsPerChunk),
       test_pairs, [&](std::span<Part> parts) {
         for (const Part& part : parts) touching_spheres += part.touching_spheres;
-        append(pool, parts, nothing, Appended{&Part::spheres, &results.spheres},
+        const auto number_crossing = [](Part* part) {
+          for (std::uint32_t& number : part->crossing) {
+            number += static_cast<std::uint32_t>(part->places[0]);
+          }
+        };
+        append(pool, parts, number_crossing, Appended{&Part::spheres, &results.spheres},
                Appended{&Part::touches, &results.touches}, Appended{&Part::candidates, &candidates},
-               Appended{&Part::compounds, &compounds});
+               Appended{&Part::compounds, &compounds}, Appended{&Part::crossing, &crossing});
       });
 
   compounds.finish();
@@ -417,9 +463,17 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
   detected->sphere_count = results.touches.size;
 
   const auto find_fixed = [&](std::size_t first, std::size_t last, Part* part) {
-    find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last), &part->candidates);
+    if (domain_ == nullptr) {
+      find_fixed_pairs(static_cast<SubShape>(first), static_cast<SubShape>(last),
+                       &part->candidates);
+      return;
+    }
+    for (const SubShape i : std::span(present_).subspan(first, last - first)) {
+      find_fixed_pairs(i, i + 1, &part->candidates);
+    }
   };
-  const std::size_t count = sub_shapes_.ranges().fixed_begin();
+  const std::size_t count =
+      domain_ == nullptr ? sub_shapes_.ranges().fixed_begin() : present_.size();
   for_each_batch(pool, count, chunk_size(count, kFewestItems, kSubShapesPerChunk), find_fixed,
                  [&](std::span<Part> parts) {
                    append(pool, parts, nothing, Appended{&Part::candidates, &candidates});
@@ -430,6 +484,7 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
   test_candidates(bodies, candidates_, recyclable, &results, pool);
   hide_points(first_general, &results, pool);
   results.spheres.finish();
+  crossing.finish();
   results.manifolds.finish();
   results.points.finish();
   results.touches.finish();

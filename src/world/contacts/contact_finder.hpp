@@ -5,6 +5,7 @@
 
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/ranks/domain.hpp"
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/bodies/sub_shape_table.hpp"
 #include "src/world/contacts/broad_phase_search.hpp"
@@ -30,6 +31,10 @@ class ContactFinder {
   /// Must be called after a body was added or removed, or got another state by set_state().
   void set_bodies(const BodyStore& bodies);
 
+  /// Limits the search to the bodies that are present, and to the contacts that this rank detects.
+  /// Must be called before each search. @param domain null: a single rank
+  void set_domain(const Domain* domain);
+
   /// Finds the contacts at the current poses and the speculative contacts: pairs that are closer
   /// than a margin, or whose velocities let them touch during the step. Contacts of two spheres
   /// precede all others; both are sorted by (a.index, b.index), then by the sub-shapes of a and of
@@ -44,6 +49,13 @@ class ContactFinder {
   std::size_t find_speculative_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
                                         const soft_step::ContactSet& recyclable,
                                         soft_step::ContactSet* set, DetectedContacts* detected);
+
+  /// With several ranks: the sub-shapes before SubShapeRanges::fixed_begin() of the bodies that are
+  /// present, ascending.
+  std::span<const SubShapeTable::SubShape> present() const noexcept { return present_; }
+  /// With several ranks: the numbers of the contacts of two spheres of the last search whose body b
+  /// is of another rank, ascending.
+  std::span<const std::uint32_t> crossing_spheres() const noexcept { return crossing_spheres_; }
 
   SubShapeTable& sub_shapes() noexcept { return sub_shapes_; }
   /// The trees of the last search.
@@ -73,6 +85,7 @@ class ContactFinder {
     std::size_t touching_spheres = 0;  ///< contacts in `spheres` with distance <= 0
     std::vector<Contact> touches;      ///< other contacts with distance <= 0
     std::vector<Candidate> candidates, compounds;
+    std::vector<std::uint32_t> crossing;  ///< with several ranks: numbers in `spheres`
     /// A contact of a body, and its hidden points (bit i: point i).
     struct Surface {
       SurfaceContact contact;
@@ -81,10 +94,11 @@ class ContactFinder {
     };
     std::vector<Surface> surfaces;
     bool any_hidden = false;
-    std::array<std::size_t, 4> places{};  ///< of its lists, where they are appended
+    std::array<std::size_t, 5> places{};  ///< of its lists, where they are appended
     void add(const BodyStore& bodies, const CandidateManifold& found);
     void clear() {
       spheres.clear();
+      crossing.clear();
       manifolds.clear();
       points.clear();
       touching_spheres = 0;
@@ -110,7 +124,18 @@ class ContactFinder {
   void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
                       const AppendAll& append_all);
 
+  bool detects(std::uint32_t a, std::uint32_t b) const {
+    return domain_ == nullptr || domain_->detects(a, b);
+  }
+  std::span<const SphereInstance> present_bounds(ThreadPool* pool);
+
   std::unique_ptr<BroadPhaseSearch> broad_phase_;
+  const Domain* domain_ = nullptr;
+  // With several ranks:
+  std::uint64_t domain_version_ = 0;            ///< that of present_; 0: none
+  std::vector<SubShape> present_;               ///< sub-shapes before fixed_begin(), ascending
+  std::vector<SphereInstance> present_bounds_;  ///< swept bounds of present_
+  std::vector<std::uint32_t> crossing_spheres_;
   const cpu::HullKernels* hull_kernels_;
   SubShapeTable sub_shapes_;
   std::vector<Candidate> candidates_, merged_candidates_;

@@ -36,12 +36,15 @@ void append_begun(const DetectedContacts& detected, const ContactView& contacts,
 
 }  // namespace
 
-BegunCounts count_begun_contacts(const ContactView& contacts, ThreadPool* pool) {
+BegunCounts count_begun_contacts(const ContactView& contacts, const Domain* domain,
+                                 ThreadPool* pool) {
   return parallel_reduce(
       pool, contacts.size(), chunk_size(contacts.size(), 64, kContactsPerCountChunk), BegunCounts(),
       [&](std::size_t first, std::size_t last) {
         BegunCounts counts;
         for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+          const soft_step::ContactKey& key = contacts.key(i);
+          if (domain != nullptr && !domain->detects(key.a, key.b)) continue;
           (contacts.is_sphere(i) ? counts.spheres : counts.points) += count_begun(contacts, i);
         }
         return counts;

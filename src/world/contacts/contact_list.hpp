@@ -6,6 +6,7 @@
 
 #include "src/base/thread_pool.hpp"
 #include "src/contact_solver/soft_step/contact_set.hpp"
+#include "src/ranks/domain.hpp"
 #include "src/world/bodies/bodies_of_step.hpp"
 #include "src/world/contacts/detected_contacts.hpp"
 
@@ -51,7 +52,9 @@ struct BegunCounts {
   std::size_t spheres = 0, points = 0;
 };
 /// @param contacts after the step, with its impulses
-BegunCounts count_begun_contacts(const soft_step::ContactView& contacts, ThreadPool* pool);
+/// @param domain null, or counts only the contacts that this rank has detected
+BegunCounts count_begun_contacts(const soft_step::ContactView& contacts, const Domain* domain,
+                                 ThreadPool* pool);
 
 /// Sets the fields of detected contacts that follow from the properties of their bodies.
 JFPX_API void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules,

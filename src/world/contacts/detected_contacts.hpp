@@ -20,6 +20,7 @@ struct DetectedContacts {
   std::vector<Vec3> position;      ///< [m], by body, at the start of the step
   /// [m/s], [rad/s], by body, at the start of the step; only in worlds with hit events
   std::vector<Vec3> velocity, angular_velocity;
+  std::uint64_t version = 0;  ///< Domain::version() in the step; 0: a single rank
 };
 
 }  // namespace JFPX_ABI

@@ -56,7 +56,7 @@ struct SweptBounds {
       const Vec3 half_motion = motion[body] * Real(0.5);
       const Real arm = length(bounds.centre - bodies.position[body]);
       const Real reach = sub_shapes.is_sphere(i) ? arm : arm + bounds.radius;
-      const Real turned = length(bodies.angular_velocity[body]) * bodies.dt;
+      const Real turned = length(bodies.turning(body)) * bodies.dt;
       sphere.centre += half_motion;
       sphere.radius += length(half_motion) + smaller(turned, Real(2)) * reach;
     }
@@ -136,7 +136,7 @@ struct SweptBounds {
       return relative;
     }
     const Vec3 arm = sub_shapes.bounds(pair.sub_shape_a).centre - bodies.position[pair.b];
-    return relative - cross(bodies.angular_velocity[pair.b], arm) * bodies.dt;
+    return relative - cross(bodies.turning(pair.b), arm) * bodies.dt;
   }
 
   /// [m], the part of margin_of() that does not depend on motion, for two solids
@@ -256,7 +256,7 @@ struct SweptBounds {
   JFPX_HD Real turn_of_mesh(SubShape mesh) const {
     const std::uint32_t body = sub_shapes.body(mesh);
     if (bodies.awake[body] == 0) return 0;
-    return length(bodies.angular_velocity[body]) * bodies.dt;
+    return length(bodies.turning(body)) * bodies.dt;
   }
   /// Enlarges by more than the rounding errors of the centre and of the radius.
   JFPX_HD static SphereInstance rounded(SphereInstance sphere) {
@@ -271,7 +271,7 @@ struct SweptBounds {
     if (sub_shapes.is_sphere(i) || bodies.awake[body] == 0) return 0;
     const SphereInstance& bounds = sub_shapes.bounds(i);
     const Real reach = length(bounds.centre - bodies.position[body]) + bounds.radius;
-    const Real turned = length(bodies.angular_velocity[body]) * bodies.dt;
+    const Real turned = length(bodies.turning(body)) * bodies.dt;
     return smaller(turned, Real(1)) * reach;
   }
   JFPX_HD static Real smaller(Real a, Real b) { return b < a ? b : a; }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/contact_solver/soft_step/blocks.hpp"
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/colors.hpp"
 #include "src/contact_solver/soft_step/row_kinds.hpp"
 #include "src/world/device/body_cells.hpp"
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "src/contact_solver/cell.hpp"
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/colors.hpp"
 #include "src/contact_solver/soft_step/step_constants.hpp"
 
 #include <array>

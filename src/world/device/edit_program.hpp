@@ -1,7 +1,7 @@
 /// Changes of single bodies between two steps on a device.
 #pragma once
 
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/colors.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/device/slot_values.hpp"
 #include "src/world/device/step_data.hpp"

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "src/base/atomic.hpp"
+#include "src/contact_solver/soft_step/colors.hpp"
 #include "src/contact_solver/soft_step/contact_match.hpp"
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
 #include "src/world/device/step_data.hpp"
 
 namespace jfpx {

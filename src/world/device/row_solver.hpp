@@ -311,9 +311,10 @@ struct RowSolver {
     body.velocity = data.step.solver[i].velocity;
     body.angular_velocity = data.step.solver[i].angular_velocity;
     if (data.step.bodies.awake[i] == 0) return body;
+    const soft_step::FreeMotion pose = data.step.motion_of_pose(i, body);
     for (std::uint32_t k = 0; k < moves; ++k) {
-      body.shift = add_scaled(body.shift, body.velocity, data.step.h);
-      body.rotation = add_scaled(body.rotation, body.angular_velocity, data.step.h);
+      body.shift = add_scaled(body.shift, pose.velocity, data.step.h);
+      body.rotation = add_scaled(body.rotation, pose.angular_velocity, data.step.h);
     }
     return body;
   }
@@ -323,8 +324,9 @@ struct RowSolver {
     const StepData& d = data;
     Quat orientation = d.step.bodies.orientation[i];
     if (d.step.bodies.awake[i] == 0) return orientation;
+    const soft_step::FreeMotion pose = d.step.motion_of_pose(i, d.step.solver[i]);
     for (std::uint32_t k = 0; k < moves; ++k) {
-      orientation = d.step.turned(orientation, d.step.solver[i]);
+      orientation = d.step.turned(orientation, pose.angular_velocity);
     }
     return orientation;
   }

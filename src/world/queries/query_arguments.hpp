@@ -11,6 +11,11 @@ inline namespace JFPX_ABI {
 /// @throws InvalidArgument with name, value and range
 [[noreturn]] void throw_invalid_query(const char* name, const std::string& value,
                                       const char* range);
+/// throw_invalid_query() unless the argument is valid.
+inline void require_in_query(bool valid, const char* name, const std::string& value,
+                             const char* range) {
+  if (!valid) throw_invalid_query(name, value, range);
+}
 
 /// The pose of a solid. @throws InvalidArgument for a shape, position or orientation that is
 /// invalid for a body

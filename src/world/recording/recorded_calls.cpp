@@ -102,6 +102,7 @@ Named(const char*, Function) -> Named<Function>;
 constexpr std::tuple kFunctions{
     Named{"add", &World::add},
     Named{"remove", &World::remove},
+    Named{"replace", &World::replace},
     Named{"set_state", &World::set_state},
     Named{"wake", &World::wake},
     Named{"set_friction", &World::set_friction},

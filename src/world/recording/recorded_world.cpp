@@ -5,6 +5,7 @@
 #include "src/world/recording/recorded_calls.hpp"
 
 #include <functional>
+#include <optional>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -13,12 +14,14 @@ using recorded::Json;
 
 struct RecordedWorld::Impl {
   Impl(const std::string& path, const Scene& scene, const WorldSettings& settings)
-      : world(scene, settings),
-        writer(path,
-               {.engine = "native",
-                .backend = std::string(to_string(settings.collider.backend)),
-                .scene = scene},
-               true) {}
+      : world(scene, settings) {
+    if (settings.communicator != nullptr && settings.communicator->rank() != 0) return;
+    writer = RecordingWriter(path,
+                             {.engine = "native",
+                              .backend = std::string(to_string(settings.collider.backend)),
+                              .scene = scene},
+                             true);
+  }
 
   /// Calls a function and records the call for the next step. The call is recorded first, because
   /// recording may fail, and removed if the function fails.
@@ -34,8 +37,8 @@ struct RecordedWorld::Impl {
   }
 
   World world;
-  RecordingWriter writer;
-  Json calls = Json::array();  ///< since the last step
+  std::optional<RecordingWriter> writer;  ///< of rank 0
+  Json calls = Json::array();             ///< since the last step
 };
 
 RecordedWorld::RecordedWorld(const std::string& path, const Scene& scene,
@@ -51,14 +54,20 @@ StepReport RecordedWorld::step() {
   const std::string calls = impl_->calls.empty() ? std::string() : impl_->calls.dump();
   StepReport report = impl_->world.step();
   impl_->calls = Json::array();
-  impl_->writer.append(impl_->world.states(), calls);
+  const auto states = impl_->world.states();
+  if (impl_->writer) impl_->writer->append(states, calls);
   return report;
 }
 
-void RecordedWorld::finish() { impl_->writer.finish(); }
+void RecordedWorld::finish() {
+  if (impl_->writer) impl_->writer->finish();
+}
 
 BodyId RecordedWorld::add(const BodyDef& body) { return impl_->call("add", &World::add, body); }
 void RecordedWorld::remove(BodyId id) { impl_->call("remove", &World::remove, id); }
+void RecordedWorld::replace(BodyId id, const BodyDef& body) {
+  impl_->call("replace", &World::replace, id, body);
+}
 void RecordedWorld::set_state(BodyId id, const BodyState& state) {
   impl_->call("set_state", &World::set_state, id, state);
 }

@@ -110,10 +110,10 @@ void BodyStore::read_locks(BinaryReader* reader) {
     const auto locks = reader->get<MotionLocks>();
     set_motion_locks(id.index, locks);
     const Vec3 &v = moving.velocity[id.index], &w = moving.angular_velocity[id.index];
+    const bool stays = detail::free_linear(locks, v) == v && detail::free_angular(locks, w) == w;
     BinaryReader::require(
-        motion_locks(id.index) == locks && detail::free_linear(locks, v) == v &&
-            detail::free_angular(locks, w) == w,
-        "a body of mass 0 has locked axes, or a body moves along or about a locked axis");
+        motion_locks(id.index) == locks && (stays || kinematic(id.index)),
+        "an immovable body has locked axes, or a body moves along or about a locked axis");
   }
   BinaryReader::require(any_locks(), "it has locks of no body");
 }
@@ -147,7 +147,6 @@ void BodyStore::read_bodies(BinaryReader* reader, const std::vector<bool>& is_fr
   }
 }
 
-/// The body in the form that add() accepts.
 BodyDef BodyStore::definition(std::uint32_t i) const {
   BodyDef def;
   const auto get = [i](const auto& column, auto& value) {

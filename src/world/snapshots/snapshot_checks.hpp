@@ -2,7 +2,7 @@
 #pragma once
 
 #include "src/base/binary_archive.hpp"
-#include "src/contact_solver/soft_step/greedy_coloring.hpp"
+#include "src/contact_solver/soft_step/colors.hpp"
 #include "src/contact_solver/soft_step/joint_set.hpp"
 #include "src/world/bodies/body_store.hpp"
 

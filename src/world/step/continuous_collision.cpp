@@ -9,12 +9,15 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 void SoftStep::stop_fast_bodies(const BodyStore& bodies, const SubShapeView& sub_shapes,
-                                const FixedTreesView& trees) {
-  const std::span<const std::uint32_t> mobile = bodies.mobile();
+                                const FixedTreesView& trees,
+                                std::span<const std::uint32_t> tested) {
+  const std::span<const std::uint32_t> mobile = moved(bodies);
   std::uint32_t any_fast = 0;
-  ContinuousCollision{step_, sub_shapes, trees}.run(
-      PoolTeam(pool_), static_cast<std::uint32_t>(mobile.size()),
-      [mobile](std::uint32_t i) { return mobile[i]; }, &any_fast);
+  ContinuousCollision{step_, sub_shapes, trees, ranks_ == nullptr ? nullptr : tested.data(),
+                      static_cast<std::uint32_t>(tested.size())}
+      .run(
+          PoolTeam(pool_), static_cast<std::uint32_t>(mobile.size()),
+          [mobile](std::uint32_t i) { return mobile[i]; }, &any_fast);
 }
 
 }  // namespace JFPX_ABI

@@ -29,6 +29,9 @@ struct ContinuousCollision {
   const soft_step::StepBodies& step;
   const SubShapeView& sub_shapes;  ///< with the poses at the start of the step
   const FixedTreesView& trees;     ///< with the motion of the step
+  /// The sub-shapes of the bodies that are tested; null: all.
+  const SubShape* tested = nullptr;
+  std::uint32_t tested_count = 0;
 
   /// Stops all bodies that would pass a fixed body.
   /// @param mobile   function from a number below `count` to a body; all movable bodies
@@ -39,7 +42,9 @@ struct ContinuousCollision {
     constexpr std::uint8_t kFast = soft_step::BodyTraits::kIsFast;
     const SubShapeRanges& ranges = sub_shapes.ranges;
     if (ranges.fixed_begin() == ranges.all()) return;
-    team.for_each(ranges.fixed_begin(), [&](std::uint32_t i) {
+    const std::uint32_t tested_end = tested == nullptr ? ranges.fixed_begin() : tested_count;
+    team.for_each(tested_end, [&](std::uint32_t k) {
+      const SubShape i = tested == nullptr ? k : tested[k];
       if (!is_fast(i)) return;
       std::uint8_t* const traits = &step.traits[sub_shapes.body(i)];
       store_shared(traits, static_cast<std::uint8_t>(load_shared(traits) | kFast));

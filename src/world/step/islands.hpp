@@ -54,6 +54,20 @@ struct Islands {
   /// Wakes the islands that touch an awake body or a kinematic body in motion.
   template <class Team>
   JFPX_HD void wake_touched(const Team& team) const {
+    mark_touched(team);
+    wake_marked(team);
+  }
+  /// Puts islands to sleep if all their bodies have been slow for long enough.
+  template <class Team>
+  JFPX_HD void put_to_sleep(const Team& team) const {
+    mark_restless(team);
+    put_unmarked_to_sleep(team);
+  }
+
+  // The parts of these functions. Several ranks combine their marks in between.
+
+  template <class Team>
+  JFPX_HD void mark_touched(const Team& team) const {
     const BodyView& bodies = step.bodies;
     find(team, [&](std::uint32_t i) { return will_touch(bodies, contacts, i); });
     for_each_body(team, [&](std::uint32_t body) {
@@ -64,23 +78,41 @@ struct Islands {
     for_each_body(team, [&](std::uint32_t body) {
       if (bodies.is_active(body) && !bodies.is_slow(body)) mark(body, kTouchesFastBody);
     });
+  }
+  template <class Team>
+  JFPX_HD void wake_marked(const Team& team) const {
+    const BodyView& bodies = step.bodies;
     for_each_body(team, [&](std::uint32_t body) {
       if (!bodies.is_asleep(body)) return;
       soft_step::wake_touched(bodies, step.motion, body, marked[sets.find(body)]);
     });
   }
 
-  /// Puts islands to sleep if all their bodies have been slow for long enough.
   template <class Team>
-  JFPX_HD void put_to_sleep(const Team& team) const {
+  JFPX_HD void mark_restless(const Team& team) const {
     const BodyView& bodies = step.bodies;
     find(team, [&](std::uint32_t i) { return has_touched(contacts, i); });
     for_each_body(team, [&](std::uint32_t body) {
       if (bodies.is_active(body) && !bodies.is_at_rest(body)) mark(body, 1);
     });
+  }
+  template <class Team>
+  JFPX_HD void put_unmarked_to_sleep(const Team& team) const {
+    const BodyView& bodies = step.bodies;
     for_each_body(team, [&](std::uint32_t body) {
       if (bodies.is_active(body) && marked[sets.find(body)] == 0) step.motion.put_to_sleep(body);
     });
+  }
+
+  /// The mark of the island of a body.
+  std::uint8_t mark_of(std::uint32_t body) const { return marked[sets.find(body)]; }
+  /// Combines the mark of the island of a body with that of another rank. @returns whether it has
+  /// changed
+  bool combine_mark(std::uint32_t body, std::uint8_t other) const {
+    std::uint8_t& mark = marked[sets.find(body)];
+    if (other == 0 || other == mark || mark == kTouchesFastBody) return false;
+    mark = other;
+    return true;
   }
 
  private:

@@ -34,11 +34,12 @@ constexpr std::size_t body_chunk(std::size_t bodies) { return chunk_size(bodies,
 }  // namespace
 
 SoftStep::SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
-                   ThreadPool* pool, SimdLevel simd)
+                   ThreadPool* pool, SimdLevel simd, WorldRanks* ranks)
     : constants_(soft_step::make_step_constants(settings, dt)),
       settings_(settings),
       materials_(materials),
       pool_(pool),
+      ranks_(ranks),
       solver_(pool, simd) {}
 
 void SoftStep::restore(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
@@ -90,8 +91,22 @@ void SoftStep::prepare(const BodyStore& bodies) {
   partition_.reserve(bodies);
 }
 
-soft_step::Islands SoftStep::islands_of(const BodyStore& bodies) {
-  const std::span<const std::uint32_t> mobile = bodies.mobile();
+/// The bodies whose motion this rank computes: all that are not immovable, in a world of one rank.
+std::span<const std::uint32_t> SoftStep::moved(const BodyStore& bodies) const {
+  return ranks_ == nullptr ? bodies.mobile() : ranks_->domain().mine();
+}
+
+/// The same and the ghosts.
+std::span<const std::uint32_t> SoftStep::present(const BodyStore& bodies) const {
+  return ranks_ == nullptr ? bodies.mobile() : ranks_->domain().present();
+}
+
+bool SoftStep::any_rank(bool condition) {
+  return ranks_ == nullptr ? condition : ranks_->domain().any(condition);
+}
+
+soft_step::Islands SoftStep::islands_of(const BodyStore& bodies,
+                                        std::span<const std::uint32_t> mobile) {
   return {.step = step_,
           .contacts = cache_.current().view(),
           .joints = joints_,
@@ -125,18 +140,65 @@ void SoftStep::mark_constrained() {
   }
 }
 
-/// Calls stage(index) for all bodies that are not immovable.
-template <class Stage>
-void SoftStep::for_each_body(const BodyStore& store, const Stage& stage) {
-  for_each_part(store, [&](std::span<const std::uint32_t> part) {
-    for (const std::uint32_t i : part) stage(i);
-  });
+/// Combines the marks of islands that have bodies of several ranks: each rank passes on the marks
+/// of its ghosts and of the bodies that are ghosts elsewhere, until no mark changes.
+void SoftStep::share_marks(const soft_step::Islands& islands) {
+  if (ranks_ == nullptr) return;
+  Domain& domain = ranks_->domain();
+  const auto read = [&](std::uint32_t body) { return islands.mark_of(body); };
+  bool changed = false;
+  const auto combine = [&](std::uint32_t body, std::uint8_t mark) {
+    changed |= islands.combine_mark(body, mark);
+  };
+  do {
+    changed = false;
+    // Bodies of one island have one mark.
+    domain.exchange_in_order(domain.lent(), domain.ghosts(), read, combine);
+    domain.exchange_in_order(domain.ghosts(), domain.lent(), read, combine);
+  } while (domain.any(changed));
 }
 
-/// Calls test(index) for all bodies that are not immovable. @returns whether one call returned true
+void SoftStep::wake_touched(const BodyStore& bodies) {
+  const auto is_asleep = [this](std::uint32_t i) { return step_.bodies.is_asleep(i); };
+  if (!any_rank(any_body(present(bodies), is_asleep))) return;
+  const soft_step::Islands islands = islands_of(bodies, present(bodies));
+  const PoolTeam team(pool_);
+  islands.mark_touched(team);
+  share_marks(islands);
+  islands.wake_marked(team);
+}
+
+void SoftStep::put_to_sleep(const BodyStore& bodies) {
+  const soft_step::Islands islands = islands_of(bodies, moved(bodies));
+  const PoolTeam team(pool_);
+  islands.mark_restless(team);
+  share_marks(islands);
+  islands.put_unmarked_to_sleep(team);
+}
+
+/// Updates the orientations of the ghosts after a move, for the rows of joints.
+void SoftStep::share_orientations() {
+  if (ranks_ == nullptr || joints_.count == 0) return;
+  Domain& domain = ranks_->domain();
+  domain.exchange(
+      domain.lent(), domain.ghosts(), [this](std::uint32_t i) { return orientation_[i]; },
+      [this](std::uint32_t i, const Quat& q) { orientation_[i] = q; });
+}
+
+/// Calls stage(index) for all bodies that are not immovable, and with several ranks for those that
+/// are present.
+template <class Stage>
+void SoftStep::for_each_body(const BodyStore& store, const Stage& stage) {
+  const std::span<const std::uint32_t> bodies = present(store);
+  parallel_for(pool_, bodies.size(), body_chunk(bodies.size()),
+               [&](std::size_t first, std::size_t last) {
+                 for (const std::uint32_t i : bodies.subspan(first, last - first)) stage(i);
+               });
+}
+
+/// @returns whether test(index) is true for any body
 template <class Test>
-bool SoftStep::any_body(const BodyStore& store, const Test& test) {
-  const std::span<const std::uint32_t> bodies = store.mobile();
+bool SoftStep::any_body(std::span<const std::uint32_t> bodies, const Test& test) {
   return parallel_reduce(
       pool_, bodies.size(), body_chunk(bodies.size()), false,
       [&](std::size_t first, std::size_t last) {
@@ -166,8 +228,8 @@ void SoftStep::load(const BodyStore& store) {
 
 std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
   constexpr std::uint32_t kNone = BodyId{}.index;
-  const std::span<const std::uint32_t> bodies = store.mobile();
-  const std::uint32_t found = parallel_reduce(
+  const std::span<const std::uint32_t> bodies = moved(store);
+  std::uint32_t found = parallel_reduce(
       pool_, bodies.size(), body_chunk(bodies.size()), kNone,
       [&](std::size_t first, std::size_t last) {
         for (const std::uint32_t i : bodies.subspan(first, last - first)) {
@@ -176,6 +238,7 @@ std::optional<BodyId> SoftStep::find_runaway(const BodyStore& store) {
         return kNone;
       },
       [](std::uint32_t x, std::uint32_t y) { return std::min(x, y); });
+  if (ranks_ != nullptr) found = std::ranges::min(ranks_->domain().gather(found));
   return found == kNone ? std::nullopt : std::optional(store.id(found));
 }
 
@@ -183,7 +246,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
   joints_ = joints;
   prepare(*bodies);
   cache_.match({bodies->inverse_masses(), bodies->moving.place, bodies->has_blocks()},
-               bodies->any_rolls(), joints, pool_);
+               bodies->any_rolls(), joints, pool_, domain());
   mark_constrained();
   step_ = {.bodies = bodies->view(),
            .motion = bodies->motion_pointers(),
@@ -193,9 +256,7 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
            .constrained = constrained_.data(),
            .moved_rotation = moved_rotation_.data(),
            .h = constants_.h};
-  if (any_body(*bodies, [this](std::uint32_t i) { return step_.bodies.is_asleep(i); })) {
-    islands_of(*bodies).wake_touched(PoolTeam(pool_));
-  }
+  wake_touched(*bodies);
   load(*bodies);
   const BodyView& view = step_.bodies;
   solver_.build({.contacts = cache_.current().view(),
@@ -216,8 +277,9 @@ std::optional<BodyId> SoftStep::solve(BodyStore* bodies, const soft_step::JointV
                  .start = bodies_.data(),
                  .restitution_threshold = constants_.restitution_threshold,
                  .inverse_friction_gap = constants_.inverse_friction_gap},
-                bodies_, bodies->mobile(), bodies->moving.place, bodies->has_blocks(),
-                {step_.bodies.last_acceleration, free_.data()}, constants_);
+                bodies_, present(*bodies), bodies->moving.place, bodies->has_blocks(),
+                {step_.bodies.last_acceleration, free_.data()}, constants_, domain());
+  if (ranks_ != nullptr) ranks_->check_owners(solver_.stray());
   run_substeps(*bodies);
   solver_.store();
   return find_runaway(*bodies);
@@ -249,10 +311,10 @@ cpu::BodySweep SoftStep::body_sweep(bool is_first) {
           .is_first = is_first};
 }
 
-/// Calls stage(bodies) for parts of all bodies that are not immovable.
+/// Calls stage(bodies) for parts of the bodies whose motion this rank computes.
 template <class Stage>
 void SoftStep::for_each_part(const BodyStore& store, const Stage& stage) {
-  const std::span<const std::uint32_t> bodies = store.mobile();
+  const std::span<const std::uint32_t> bodies = moved(store);
   parallel_for(pool_, bodies.size(), body_chunk(bodies.size()),
                [&](std::size_t first, std::size_t last) {
                  for (; first < last; first += kBodiesPerKernel) {
@@ -312,7 +374,7 @@ void SoftStep::move_bodies(const BodyStore& store) {
     for (const std::uint32_t i : part) {
       if (step_.bodies.awake[i] == 0) continue;
       const bool has_joints = step_.constrained[i] >= soft_step::kHasJoint;
-      if (kernels != nullptr && !has_joints) {
+      if (kernels != nullptr && !has_joints && !step_.bodies.is_conveyor(i)) {
         items[count++] = i;
       } else {
         step_.move(i, has_joints, &step_.orientation[i], &step_.solver[i]);
@@ -335,18 +397,22 @@ void SoftStep::run_substeps(const BodyStore& bodies) {
     }
     solver_.sweep(Sweep::bias);
     move_bodies(bodies);
+    share_orientations();
     for (std::uint32_t k = 0; k < soft_step::kRelaxSweeps; ++k) solver_.sweep(Sweep::relax);
   }
-  if (solver_.needs_restitution()) solver_.sweep(Sweep::restitution);
+  if (any_rank(solver_.needs_restitution())) solver_.sweep(Sweep::restitution);
 }
 
 void SoftStep::commit(BodyStore* bodies, std::uint64_t steps, const SubShapeView& sub_shapes,
-                      const FixedTreesView& trees) noexcept {
-  stop_fast_bodies(*bodies, sub_shapes, trees);
-  const bool any_rests = any_body(*bodies, [this](std::uint32_t i) { return step_.store(i); });
-  if (any_rests) islands_of(*bodies).put_to_sleep(PoolTeam(pool_));
+                      const FixedTreesView& trees, std::span<const std::uint32_t> present) {
+  stop_fast_bodies(*bodies, sub_shapes, trees, present);
+  const bool any_rests =
+      any_body(moved(*bodies), [this](std::uint32_t i) { return step_.store(i); });
+  if (any_rank(any_rests)) put_to_sleep(*bodies);
   cache_.commit();
-  partition_.update(bodies, steps, pool_);
+  if (ranks_ == nullptr || ranks_->prepare_partition(bodies, steps)) {
+    partition_.update(bodies, steps, pool_);
+  }
 }
 
 }  // namespace JFPX_ABI

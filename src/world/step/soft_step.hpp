@@ -9,6 +9,7 @@
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/bodies/partition.hpp"
 #include "src/world/contacts/swept_bounds.hpp"
+#include "src/world/ranks/world_ranks.hpp"
 #include "src/world/step/islands.hpp"
 #include "src/world/step/soft_step_stages.hpp"
 
@@ -26,13 +27,15 @@ class SoftStep {
  public:
   /// @param pool outlives the object
   /// @param simd widest vector instructions of the sweeps
+  /// @param ranks outlives the object; null: a single rank
   SoftStep(const SoftStepSettings& settings, const MaterialSettings& materials, Real dt,
-           ThreadPool* pool, SimdLevel simd);
+           ThreadPool* pool, SimdLevel simd, WorldRanks* ranks = nullptr);
 
   /// Contacts of the current step, for ContactFinder::find_speculative_contacts().
   soft_step::ContactSet& contacts() { return cache_.current(); }
   /// After commit(): contacts of the second-to-last step, until the next detection.
-  soft_step::ContactView contacts_before() { return cache_.current().view(); }
+  soft_step::ContactView contacts_before() { return set_before().view(); }
+  soft_step::ContactSet& set_before() { return cache_.current(); }
   /// Contacts of the last completed step, with their impulses and colors.
   soft_step::ContactSet& last_contacts() { return cache_.last(); }
   /// Const overload. drop_removed() must have been called since the last forget().
@@ -49,8 +52,9 @@ class SoftStep {
   /// if it is due.
   /// @param steps World::steps() before the step
   /// @param sub_shapes,trees those of the contact search of the step
+  /// @param present ContactFinder::present()
   void commit(BodyStore* bodies, std::uint64_t steps, const SubShapeView& sub_shapes,
-              const FixedTreesView& trees) noexcept;
+              const FixedTreesView& trees, std::span<const std::uint32_t> present);
   /// Reserves memory for bodies with indices below `bodies`. @throws std::bad_alloc
   void reserve(std::size_t bodies) { cache_.reserve(bodies); }
   /// Replaces the parameters of the constructor and the contacts of the last completed step.
@@ -71,7 +75,15 @@ class SoftStep {
 
  private:
   void prepare(const BodyStore& bodies);
-  soft_step::Islands islands_of(const BodyStore& bodies);
+  soft_step::Islands islands_of(const BodyStore& bodies, std::span<const std::uint32_t> mobile);
+  std::span<const std::uint32_t> moved(const BodyStore& bodies) const;
+  std::span<const std::uint32_t> present(const BodyStore& bodies) const;
+  Domain* domain() const { return ranks_ == nullptr ? nullptr : &ranks_->domain(); }
+  void wake_touched(const BodyStore& bodies);
+  void put_to_sleep(const BodyStore& bodies);
+  void share_marks(const soft_step::Islands& islands);
+  void share_orientations();
+  bool any_rank(bool condition);
   void mark_constrained();
   template <class Stage>
   void for_each_body(const BodyStore& bodies, const Stage& stage);
@@ -83,16 +95,17 @@ class SoftStep {
   void move_bodies(const BodyStore& bodies);
   void run_substeps(const BodyStore& bodies);
   template <class Test>
-  bool any_body(const BodyStore& bodies, const Test& test);
+  bool any_body(std::span<const std::uint32_t> bodies, const Test& test);
   void load(const BodyStore& bodies);
   std::optional<BodyId> find_runaway(const BodyStore& bodies);
   void stop_fast_bodies(const BodyStore& bodies, const SubShapeView& sub_shapes,
-                        const FixedTreesView& trees);
+                        const FixedTreesView& trees, std::span<const std::uint32_t> tested);
 
   soft_step::StepConstants constants_;
   SoftStepSettings settings_;
   MaterialSettings materials_;
   ThreadPool* pool_;
+  WorldRanks* ranks_;
   soft_step::ContactCache cache_;
   soft_step::SoftStepSolver solver_;
 

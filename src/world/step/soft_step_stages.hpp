@@ -161,7 +161,7 @@ struct StepBodies {
   /// inverse mass for all directions. The locks thus act like a row that is solved after sweeps,
   /// as in Box2D. Locked rotations need nothing: the inverse inertia has them.
   JFPX_HD void hold(std::uint32_t i, SolverBody* body) const {
-    if (!bodies.any_locks) return;
+    if (!bodies.any_locks || !bodies.movable(i)) return;
     body->velocity = bodies.admitted(i, body->velocity);
     body->shift = bodies.admitted(i, body->shift);
   }
@@ -173,20 +173,29 @@ struct StepBodies {
   JFPX_HD void move(std::uint32_t i, bool has_joints, Quat* orientation_now,
                     SolverBody* body) const {
     hold(i, body);
-    body->shift = add_scaled(body->shift, body->velocity, h);
-    *orientation_now = turned(*orientation_now, *body);
+    const FreeMotion pose = motion_of_pose(i, *body);
+    body->shift = add_scaled(body->shift, pose.velocity, h);
+    *orientation_now = turned(*orientation_now, pose.angular_velocity);
     if (has_joints) {
       const Vec3 projected = body->rotation - moved_rotation[i];
       if (!(projected == Vec3{})) *orientation_now = rotated_by(*orientation_now, projected);
     }
-    body->rotation = add_scaled(body->rotation, body->angular_velocity, h);
+    body->rotation = add_scaled(body->rotation, pose.angular_velocity, h);
     if (has_joints) moved_rotation[i] = body->rotation;
   }
 
+  /// The velocities with which the pose of a body changes: those of the body, or of a conveyor
+  /// those along and about free axes.
+  JFPX_HD FreeMotion motion_of_pose(std::uint32_t i, const SolverBody& body) const {
+    if (!bodies.is_conveyor(i)) return {body.velocity, body.angular_velocity};
+    const MotionLocks& locks = bodies.motion_locks[i];
+    return {detail::free_linear(locks, body.velocity),
+            detail::free_angular(locks, body.angular_velocity)};
+  }
   /// The orientation of a body after a substep. An overflow makes it zero until the step is undone.
-  JFPX_HD Quat turned(const Quat& before, const SolverBody& body) const {
+  JFPX_HD Quat turned(const Quat& before, const Vec3& angular_velocity) const {
     if (before == Quat{0, 0, 0, 0}) return before;
-    return detail::integrated_orientation(before, body.angular_velocity, h);
+    return detail::integrated_orientation(before, angular_velocity, h);
   }
 
   /// State of an awake body at the end of the step.

@@ -6,8 +6,10 @@
 #include "src/contact_solver/soft_step/step_constants.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -15,11 +17,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace soft_step {
 
-/// The movable bodies of a step by block. Bodies without a place follow in blocks of their own,
-/// which have no inner rows. Buffers grow and never shrink.
+/// The movable bodies of a step by block: the blocks with at least one of the bodies, in their
+/// order. Bodies without a place follow in blocks of their own, which have no inner rows. Buffers
+/// grow and never shrink.
 class BodyBlocks {
  public:
-  /// @param mobile indices of the bodies that are not immovable, ascending
+  /// @param mobile indices of bodies that are not immovable, ascending
   /// @param bodies by index
   /// @param places by index
   /// @param pool   null: in the calling thread
@@ -49,29 +52,34 @@ class BodyBlocks {
         [](const Extent& x, const Extent& y) {
           return Extent{std::max(x.end, y.end), x.without_place + y.without_place};
         });
-    const bool has_all_places = extent.without_place == 0;
-    // The first body without a place starts a block.
-    const std::size_t placed =
-        has_all_places ? extent.end : block_count(extent.end) * kBodiesPerBlock;
-    bodies_.resize(placed + extent.without_place);
+    without_place_ = {};
+    number_.assign(block_count(extent.end), 0);
+    parallel_for(pool, mobile.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
+      for_movable(first, last, [&](std::uint32_t body) {
+        if (places[body] == kNoPlace) return;
+        std::atomic_ref(number_[block_of(places[body])]).store(1, std::memory_order_relaxed);
+      });
+    });
+    // The last block has a body.
+    std::exclusive_scan(number_.begin(), number_.end(), number_.begin(), 0u);
+    const std::size_t blocks = number_.empty() ? 0 : number_.back() + 1;
+    bodies_.resize(blocks * kBodiesPerBlock);
     parallel_for(pool, bodies_.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
       std::ranges::fill(std::span(bodies_).subspan(first, last - first), kNoBody);
     });
+    places_ = places;
     parallel_for(pool, mobile.size(), kBodiesPerChunk, [&](std::size_t first, std::size_t last) {
       for_movable(first, last, [&](std::uint32_t body) {
-        if (places[body] != kNoPlace) bodies_[places[body]] = body;
+        if (places[body] == kNoPlace) return;
+        bodies_[block(body) * kBodiesPerBlock + places[body] % kBodiesPerBlock] = body;
       });
     });
-    places_ = places;
-    if (has_all_places) return;
-    own_places_.assign(places.begin(), places.end());
-    places_ = own_places_;
-    auto next = static_cast<std::uint32_t>(placed);
+    if (extent.without_place == 0) return;
+    bodies_.reserve(bodies_.size() + extent.without_place);
     for_movable(0, mobile.size(), [&](std::uint32_t body) {
-      if (places[body] != kNoPlace) return;
-      own_places_[body] = next;
-      bodies_[next++] = body;
+      if (places[body] == kNoPlace) bodies_.push_back(body);
     });
+    without_place_ = std::span(bodies_).subspan(blocks * kBodiesPerBlock);
   }
 
   /// Number of blocks.
@@ -88,17 +96,23 @@ class BodyBlocks {
       if (bodies[k] != kNoBody) f(bodies[k]);
     }
   }
-  /// Block of a movable body.
-  std::uint32_t block(std::uint32_t body) const { return block_of(places_[body]); }
+  /// Block of one of the movable bodies.
+  std::uint32_t block(std::uint32_t body) const {
+    if (places_[body] != kNoPlace) return number_[block_of(places_[body])];
+    const auto at = std::ranges::lower_bound(without_place_, body) - without_place_.begin();
+    const std::size_t before = bodies_.size() - without_place_.size();
+    return block_of(static_cast<std::uint32_t>(before + static_cast<std::size_t>(at)));
+  }
 
  private:
   static constexpr std::size_t kBodiesPerChunk = 16384;
   /// An unused place.
   static constexpr std::uint32_t kNoBody = 0xffffffffu;
 
-  std::vector<std::uint32_t> bodies_;      ///< by place
-  std::span<const std::uint32_t> places_;  ///< by body
-  std::vector<std::uint32_t> own_places_;  ///< by body, if some bodies have no place
+  std::vector<std::uint32_t> number_;  ///< by block of the partition: its number among the blocks
+  std::vector<std::uint32_t> bodies_;  ///< by block, then by place
+  std::span<const std::uint32_t> places_;         ///< by body
+  std::span<const std::uint32_t> without_place_;  ///< the last ones of bodies_, ascending
 };
 
 }  // namespace soft_step

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <map>
 #include <mutex>
 #include <numeric>
 #include <tuple>
@@ -123,11 +124,13 @@ cpu::SweepSoftness softness(const Softness& s) {
           static_cast<unsigned>(row % cpu::kBundle)};
 }
 
+/// Whether a sweep solves only rows of joints.
+bool is_of_joints(Sweep sweep) { return sweep == Sweep::first_joints || sweep == Sweep::joints; }
+
 /// Whether a sweep solves rows of a type.
 template <class Row>
 bool takes_part(Sweep sweep) {
-  const bool is_of_joints = sweep == Sweep::first_joints || sweep == Sweep::joints;
-  return !is_of_joints || kKindOf<Row> >= kContactRowKinds;
+  return !is_of_joints(sweep) || kKindOf<Row> >= kContactRowKinds;
 }
 
 /// A number without a row.
@@ -160,6 +163,7 @@ void SoftStepSolver::inspect_contacts() {
   const std::uint32_t count = setup_.size();
   resize_geometric(&kinds_, count);
   listed_.clear();
+  crossing_contacts_.clear();
   SpinLock mutex;
   struct Ends {
     std::uint32_t inner = 0, crossing = 0;
@@ -177,6 +181,18 @@ void SoftStepSolver::inspect_contacts() {
     for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
       kinds_[i] = setup_.kind_of(i);
       if (kinds_[i] == kNoRow) continue;
+      if (domain_ != nullptr) {
+        const ContactKey key = setup_.key(i);
+        const bool is_of_world = key.b == kWorld;
+        if (!domain_->is_mine(key.a) && (is_of_world || !domain_->is_mine(key.b))) {
+          kinds_[i] = kNoRow;  // a joint of bodies of another rank
+          continue;
+        }
+        if (!is_of_world && domain_->crosses(key.a, key.b)) {
+          const std::lock_guard lock(mutex);
+          crossing_contacts_.push_back(i);
+        }
+      }
       const std::uint32_t color = setup_.color_of(i);
       if (!is_color(color)) {
         if (listed_count == listed.size()) flush();
@@ -197,11 +213,129 @@ void SoftStepSolver::inspect_contacts() {
   if (has_blocks_) {
     shape_ = {blocks_.size(), ends.inner, ends.crossing, blocks_.size()};
   } else {
-    const auto parts = [this](unsigned bits) {
-      return (bodies_.size() + (1u << bits) - 1) >> bits;
-    };
+    const auto parts = [this](unsigned bits) { return (count_bodies() >> bits) + 1; };
     shape_ = {parts(part_bits_), 0, ends.crossing, parts(kFixedPartBits)};
   }
+}
+
+/// Adds the bodies of a row of two ranks.
+void SoftStepSolver::add_to_border(Border* border, const ContactKey& key) const {
+  const bool is_a_mine = domain_->is_mine(key.a);
+  const std::uint32_t mine = is_a_mine ? key.a : key.b, foreign = is_a_mine ? key.b : key.a;
+  const Domain::Rank rank = domain_->owner(foreign);
+  border->mine.add(rank, mine);
+  border->foreign.add(rank, foreign);
+}
+
+/// Lists the bodies of the rows that connect bodies of two ranks, in the order of the contacts,
+/// which is the same on both ranks.
+void SoftStepSolver::find_borders() {
+  std::ranges::sort(crossing_contacts_);
+  borders_.resize(kColorsPerClass);
+  joint_borders_.resize(kColorsPerClass);
+  for (Border& border : borders_) border.clear(domain_->ranks());
+  for (Border& border : joint_borders_) border.clear(domain_->ranks());
+  struct Colors {
+    std::uint64_t all = 0, of_joints = 0;
+    std::uint64_t has_overflow = 0;
+  } colors;
+  for (const std::uint32_t contact : crossing_contacts_) {
+    const std::uint32_t color = setup_.color_of(contact);
+    if (!is_color(color)) continue;
+    const std::uint32_t number = number_in_class(color);
+    add_to_border(&borders_[number], setup_.key(contact));
+    colors.all |= std::uint64_t{1} << number;
+    if (!setup_.is_joint(contact)) continue;
+    add_to_border(&joint_borders_[number], setup_.key(contact));
+    colors.of_joints |= std::uint64_t{1} << number;
+  }
+  colors.has_overflow = overflow_.empty() ? 0 : 1;
+  border_colors_ = joint_border_colors_ = 0;
+  any_overflow_ = false;
+  for (const Colors& c : domain_->gather(colors)) {
+    border_colors_ |= c.all;
+    joint_border_colors_ |= c.of_joints;
+    any_overflow_ |= c.has_overflow != 0;
+  }
+  stray_.clear();
+  if (any_overflow_) find_overflow_border();
+}
+
+/// The same for the overflow, which rank 0 solves. Each body is once in the lists.
+void SoftStepSolver::find_overflow_border() {
+  overflow_border_.clear(domain_->ranks());
+  std::map<std::uint32_t, std::size_t> counts;
+  for (const ListedContact& listed : overflow_) {
+    const ContactKey key = setup_.key(listed.contact);
+    ++counts[key.a];
+    ++counts[key.b];
+  }
+  for (const ListedContact& listed : overflow_) {
+    const ContactKey key = setup_.key(listed.contact);
+    if (domain_->owner(key.a) != 0 && domain_->owner(key.b) != 0) {
+      stray_.push_back(counts[key.a] >= counts[key.b] ? key.a : key.b);
+    } else if (domain_->crosses(key.a, key.b)) {
+      add_to_border(&overflow_border_, key);
+    }
+  }
+  overflow_border_.mine.sort();
+  overflow_border_.foreign.sort();
+  // Only rank 0 receives bodies before a sweep of the overflow.
+  (domain_->rank() == 0 ? overflow_border_.mine : overflow_border_.foreign).clear(domain_->ranks());
+}
+
+/// Sends the impulses of the overflow from rank 0 to the other ranks of its contacts.
+void SoftStepSolver::store_overflow() {
+  const std::span<Communicator::Message> messages = domain_->start_messages();
+  const auto for_crossing = [&](const auto& f) {
+    for (const ListedContact& listed : overflow_) {
+      const ContactKey key = setup_.key(listed.contact);
+      if (domain_->crosses(key.a, key.b)) f(listed.contact, domain_->other_rank(key.a, key.b));
+    }
+  };
+  const auto impulses_of = [&](std::uint32_t contact) {
+    return std::span(setup_.contacts.impulses + setup_.contacts.first_impulse(contact),
+                     setup_.contacts.impulse_count(contact));
+  };
+  const auto joint_of = [&](std::uint32_t contact) {
+    return std::span(&setup_.joints.now[contact - setup_.contacts.size()], 1);
+  };
+  if (domain_->rank() == 0) {
+    for_crossing([&](std::uint32_t contact, Domain::Rank rank) {
+      Communicator::Message* const message = &messages[rank];
+      if (setup_.is_joint(contact)) {
+        return append_items(message, std::span<const KeptJoint>(joint_of(contact)));
+      }
+      append_items(message, std::span<const KeptImpulse>(impulses_of(contact)));
+      if (setup_.contacts.rolling_impulses == nullptr) return;
+      append_items(message, std::span<const Vec3>(setup_.contacts.rolling_impulses + contact, 1));
+    });
+  }
+  const std::span<const Communicator::Message> received = domain_->send();
+  if (domain_->rank() == 0) return;
+  MessageReader reader(received[0]);
+  for_crossing([&](std::uint32_t contact, Domain::Rank) {
+    if (setup_.is_joint(contact)) {
+      joint_of(contact)[0] = reader.get<KeptJoint>();
+      return;
+    }
+    for (KeptImpulse& impulse : impulses_of(contact)) impulse = reader.get<KeptImpulse>();
+    if (setup_.contacts.rolling_impulses == nullptr) return;
+    setup_.contacts.rolling_impulses[contact] = reader.get<Vec3>();
+  });
+}
+
+/// Whether any rank has rows of a color that connect bodies of two ranks.
+bool SoftStepSolver::exchanges(std::size_t color, Sweep sweep) const {
+  return ((is_of_joints(sweep) ? joint_border_colors_ : border_colors_) >> color & 1) != 0;
+}
+
+/// Sends the bodies of this rank in the rows of a color, and receives the other bodies of the rows.
+void SoftStepSolver::exchange(std::size_t color, Sweep sweep) {
+  const Border& border = (is_of_joints(sweep) ? joint_borders_ : borders_)[color];
+  domain_->exchange(
+      border.mine, border.foreign, [this](std::uint32_t body) { return bodies_[body]; },
+      [this](std::uint32_t body, const SolverBody& state) { bodies_[body] = state; });
 }
 
 /// Finds the contacts of each body a in a list that is sorted by key.
@@ -236,14 +370,15 @@ void SoftStepSolver::list_joints() {
   if (!std::ranges::is_sorted(joints_)) std::ranges::sort(joints_);
 }
 
-/// The part of a movable body.
+/// The part of a movable body. It is not lower than those of bodies with lower indices, in a world
+/// of one block.
 std::uint32_t SoftStepSolver::part_of(std::uint32_t body) const {
-  return has_blocks_ ? blocks_.block(body) : body >> part_bits_;
+  return has_blocks_ ? blocks_.block(body) : number_of(body) >> part_bits_;
 }
 
 /// Part of the contacts of a movable body with fixed bodies.
 std::uint32_t SoftStepSolver::fixed_part_of(std::uint32_t body) const {
-  return has_blocks_ ? blocks_.block(body) : body >> kFixedPartBits;
+  return has_blocks_ ? blocks_.block(body) : number_of(body) >> kFixedPartBits;
 }
 
 /// Divides the listed contacts into the overflow, and those with fixed bodies by part.
@@ -450,8 +585,10 @@ std::uint32_t SoftStepSolver::fill(RowKind kind, std::uint32_t contact, Place* p
 void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
                            std::span<const std::uint32_t> mobile,
                            std::span<const std::uint32_t> places, bool has_blocks,
-                           const ImpactBodies& impacts, const StepConstants& constants) {
+                           const ImpactBodies& impacts, const StepConstants& constants,
+                           Domain* domain) {
   setup_ = setup;
+  domain_ = domain;
   impacts_ = impacts;
   constants_ = constants;
   bodies_ = bodies;
@@ -459,7 +596,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   is_packed_ = false;
   any_rebound_.store(false, std::memory_order_relaxed);
   phases_.reserve(kColorsPerClass + 2);
-  part_bits_ = static_cast<unsigned>(std::bit_width(chunk_size(bodies.size(), 32, 128)) - 1);
+  part_bits_ = static_cast<unsigned>(std::bit_width(chunk_size(count_bodies(), 32, 128)) - 1);
   if (has_blocks) blocks_.build(mobile, bodies, places, pool_);
   inspect_contacts();
   if (has_blocks) {
@@ -468,6 +605,7 @@ void SoftStepSolver::build(const RowSetup& setup, std::span<SolverBody> bodies,
   }
   list_joints();
   group_fixed();
+  if (domain_ != nullptr) find_borders();
   allocate_rows();
   for_parts(shape_.parts, [this](std::size_t part) { place_rows(part); });
   for_parts(shape_.fixed_parts, [this](std::size_t part) { place_fixed_rows(part); });
@@ -797,21 +935,43 @@ void SoftStepSolver::sweep_crossing(std::size_t color, std::size_t chunk, std::s
 void SoftStepSolver::find_phases(Sweep sweep) {
   phases_.clear();
   if (shape_.inner_colors > 0) phases_.push_back({Phase::inner, 0, 0, shape_.parts});
-  for (std::size_t color = 0; color < shape_.crossing_colors; ++color) {
-    const std::size_t chunks = chunks_of_color(color, sweep);
-    if (chunks == 0) continue;
-    const bool joins = chunks == 1 && !phases_.empty() && phases_.back().kind == Phase::crossing &&
-                       phases_.back().chunks == 1;
+  const std::size_t colors = domain_ == nullptr ? shape_.crossing_colors : kColorsPerClass;
+  for (std::size_t color = 0; color < colors; ++color) {
+    const std::size_t chunks = color < shape_.crossing_colors ? chunks_of_color(color, sweep) : 0;
+    const bool is_exchanged = domain_ != nullptr && exchanges(color, sweep);
+    if (chunks == 0 && !is_exchanged) continue;
+    const bool joins = chunks == 1 && !is_exchanged && !phases_.empty() &&
+                       phases_.back().kind == Phase::crossing && phases_.back().chunks == 1;
     if (joins) {
       phases_.back().last_color = color;
     } else {
-      phases_.push_back({Phase::crossing, color, color, chunks});
+      phases_.push_back({Phase::crossing, color, color, chunks, is_exchanged});
     }
   }
   if (!fixed_.empty()) phases_.push_back({Phase::fixed, 0, 0, shape_.fixed_parts});
 }
 
 void SoftStepSolver::sweep_overflow(Sweep sweep) {
+  // A rebound also changes FreeMotion.
+  struct State {
+    SolverBody body;
+    FreeMotion free;
+  };
+  const auto read = [this](std::uint32_t body) {
+    return State{bodies_[body], impacts_.free[body]};
+  };
+  const auto write = [this](std::uint32_t body, const State& state) {
+    bodies_[body] = state.body;
+    impacts_.free[body] = state.free;
+  };
+  const Border& border = overflow_border_;
+  const bool is_shared = domain_ != nullptr && any_overflow_;
+  if (is_shared) domain_->exchange(border.mine, border.foreign, read, write);
+  if (!is_shared || domain_->rank() == 0) solve_overflow(sweep);
+  if (is_shared) domain_->exchange(border.foreign, border.mine, read, write);
+}
+
+void SoftStepSolver::solve_overflow(Sweep sweep) {
   with_operation(sweep, [&](const auto& operation) {
     for (const ListedContact& listed : overflow_) {
       visit_row(listed.kind, [&]<class Row>(std::type_identity<Row>) {
@@ -840,8 +1000,14 @@ void SoftStepSolver::sweep(Sweep sweep) {
           return sweep_fixed(chunk, sweep, operation);
       }
     };
-    pool_->run_phases(
-        phases_.size(), [this](std::size_t number) { return phases_[number].chunks; }, run);
+    for (std::size_t first = 0, last = 0; first < phases_.size(); first = last) {
+      if (phases_[first].exchanges) exchange(phases_[first].first_color, sweep);
+      for (last = first + 1; last < phases_.size() && !phases_[last].exchanges;) ++last;
+      if (phases_[first].chunks == 0 && ++first == last) continue;
+      pool_->run_phases(
+          last - first, [&](std::size_t number) { return phases_[first + number].chunks; },
+          [&](std::size_t number, std::size_t chunk) { run(first + number, chunk); });
+    }
   });
 }
 
@@ -931,6 +1097,7 @@ void SoftStepSolver::store() {
     parallel_for(pool_, count, row_chunk<Row>(count),
                  [&](std::size_t first, std::size_t last) { store(rows, first, last); });
   });
+  if (domain_ != nullptr && any_overflow_) store_overflow();
 }
 
 }  // namespace soft_step

@@ -12,6 +12,7 @@
 #include "src/contact_solver/soft_step/cpu/row_table.hpp"
 #include "src/contact_solver/soft_step/cpu/sphere_sweep.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
+#include "src/ranks/domain.hpp"
 
 #include <array>
 #include <atomic>
@@ -67,9 +68,17 @@ class SoftStepSolver {
   /// @param places by index
   /// @param mobile indices of the bodies that are not immovable, ascending
   /// @param has_blocks whether the world has several blocks; otherwise threads share the colors
+  /// @param domain null: a single rank. Otherwise, a row of bodies of two ranks is solved by both:
+  ///   before each color with such rows, the ranks exchange their bodies. The bodies of a block
+  ///   have one owner.
   void build(const RowSetup& setup, std::span<SolverBody> bodies,
              std::span<const std::uint32_t> mobile, std::span<const std::uint32_t> places,
-             bool has_blocks, const ImpactBodies& impacts, const StepConstants& constants);
+             bool has_blocks, const ImpactBodies& impacts, const StepConstants& constants,
+             Domain* domain = nullptr);
+  /// With several ranks, rank 0 solves the overflow, and has one of the bodies of each of its rows.
+  /// @returns after build(): bodies that rank 0 must own. If any rank has some, the step must be
+  ///   repeated with other owners.
+  std::span<const std::uint32_t> stray() const { return stray_; }
   /// A sweep over all rows.
   void sweep(Sweep sweep);
   /// Whether a restitution sweep has an effect.
@@ -136,6 +145,14 @@ class SoftStepSolver {
     std::uint32_t contact = 0;  ///< its number
     friend auto operator<=>(const PartJoint&, const PartJoint&) = default;
   };
+  /// Bodies in the rows of a color, or of the overflow, that connect bodies of two ranks.
+  struct Border {
+    BodyLists mine, foreign;
+    void clear(std::size_t ranks) {
+      mine.clear(ranks);
+      foreign.clear(ranks);
+    }
+  };
   struct Cursors;
 
   template <class Row>
@@ -157,6 +174,12 @@ class SoftStepSolver {
   }
 
   void inspect_contacts();
+  void find_borders();
+  void add_to_border(Border* border, const ContactKey& key) const;
+  void find_overflow_border();
+  void store_overflow();
+  void exchange(std::size_t color, Sweep sweep);
+  bool exchanges(std::size_t color, Sweep sweep) const;
   template <class Contact>
   void find_ranges(const Contact* contacts, std::uint32_t count,
                    std::vector<std::uint32_t>* ranges);
@@ -176,6 +199,14 @@ class SoftStepSolver {
   void prefetch_contacts(std::uint32_t body) const;
   template <class F>
   void for_contacts(std::size_t part, const F& f) const;
+  /// Number of bodies in parts of a world of one block: those of this rank.
+  std::size_t count_bodies() const {
+    return domain_ == nullptr ? bodies_.size() : domain_->mine().size();
+  }
+  /// The number of a body among these; of a ghost, that of the next one.
+  std::uint32_t number_of(std::uint32_t body) const {
+    return domain_ == nullptr ? body : domain_->count_before(body);
+  }
   std::uint32_t part_of(std::uint32_t body) const;
   std::uint32_t fixed_part_of(std::uint32_t body) const;
   std::span<ListedContact> fixed_of(std::size_t part) {
@@ -199,6 +230,7 @@ class SoftStepSolver {
     enum Kind : std::uint8_t { inner, crossing, fixed } kind;
     std::size_t first_color, last_color;  ///< of crossing rows
     std::size_t chunks;
+    bool exchanges = false;  ///< whether ranks exchange bodies before the phase
   };
   template <class Operation>
   void sweep_fixed(std::size_t part, Sweep sweep, const Operation& operation);
@@ -210,6 +242,7 @@ class SoftStepSolver {
                       const Operation& operation);
   void find_phases(Sweep sweep);
   void sweep_overflow(Sweep sweep);
+  void solve_overflow(Sweep sweep);
   template <class F>
   static void for_fixed_and_others(const RowTable& table, std::size_t first, std::size_t last,
                                    const F& f);
@@ -249,6 +282,14 @@ class SoftStepSolver {
   std::vector<ListedContact> overflow_;     ///< sorted by (kind, contact)
   std::vector<ListedContact> listed_;       ///< unsorted
   RowTable::Shape shape_;
+  // With several ranks:
+  Domain* domain_ = nullptr;
+  std::vector<std::uint32_t> crossing_contacts_;  ///< that connect bodies of two ranks, ascending
+  std::vector<Border> borders_, joint_borders_;   ///< by color: of all rows, and of joints
+  std::uint64_t border_colors_ = 0, joint_border_colors_ = 0;  ///< those of any rank, as bits
+  bool any_overflow_ = false;                                  ///< on any rank
+  Border overflow_border_;
+  std::vector<std::uint32_t> stray_;
   std::vector<Phase> phases_;              ///< of a sweep
   std::atomic<bool> any_rebound_ = false;  ///< whether a restitution sweep has an effect
   RowsOfTypes<RowTypes>::type rows_;

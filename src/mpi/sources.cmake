@@ -1,0 +1,3 @@
+list(APPEND JFPX_MPI_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/communicator.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/session.cpp)

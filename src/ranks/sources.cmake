@@ -1,0 +1,2 @@
+list(APPEND JFPX_SOURCES
+  ${CMAKE_CURRENT_LIST_DIR}/domain.cpp)
