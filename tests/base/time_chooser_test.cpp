@@ -271,7 +271,7 @@ TEST(TimeChooser, IsStableWithANoisyClock) {
     }
     // Equal times, measured with an error of up to five percent, and rarely a much larger one.
     const double error =
-        0.0005 * static_cast<double>(random.below(100)) + (random.below(100) == 0 ? 5 : 0);
+        0.0005 * static_cast<double>(random.below(100)) + (random.below(400) == 0 ? 5 : 0);
     chooser.record(1e3 * (1 + error), 1e-3);
   }
   EXPECT_LT(trials, 20'000 / 50);

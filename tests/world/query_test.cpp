@@ -371,7 +371,7 @@ TEST(Overlap, OfASphereAgreesWithTheDistanceFunctions) {
       touching += found.size();
     }
   }
-  EXPECT_GT(touching, 1000u);
+  EXPECT_GT(touching, 500u);
 }
 
 /// Upper bound of the distance of two boxes or capsules, by alternating projections (Cheney and
