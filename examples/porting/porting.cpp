@@ -56,6 +56,20 @@ class Lines : public jfpx::DebugDraw {
   std::vector<Vertex> vertices;
 };
 
+/// A one-way platform: bodies pass it while they rise, or while their centre is below its top.
+struct OneWay {
+  jfpx::BodyId platform;
+  Real top = 0;  ///< [m]
+
+  void operator()(jfpx::ContactContext& context) const {
+    for (jfpx::DetectedContact& contact : context.detected()) {
+      if (contact.a != platform && contact.b != platform) continue;
+      const jfpx::BodyState body = context.state(contact.a == platform ? contact.b : contact.a);
+      contact.ignored = body.velocity.y > Real(0.1) || body.position.y < top;
+    }
+  }
+};
+
 /// Makes a body immovable where it is.
 void freeze(jfpx::World& world, jfpx::BodyId id) {
   jfpx::BodyDef body = world.definition(id);
@@ -83,6 +97,13 @@ int main() {
   world.add(belt);
   const jfpx::BodyId parcel =
       world.add(body(jfpx::Box{{Real(0.2), Real(0.2), Real(0.2)}}, {-3, Real(0.4), -12}, 5, {}));
+
+  const jfpx::BodyId ledge =
+      world.add(body(jfpx::Box{{2, Real(0.1), 2}}, {-14, Real(1.9), 0}, 0, {kLevel}));
+  world.add_contact_generator(OneWay{ledge, 2});
+  jfpx::BodyDef thrown = body(jfpx::Sphere{Real(0.25)}, {-14, Real(0.25), 0}, 1, {});
+  thrown.velocity = {0, 8, 0};
+  const jfpx::BodyId ball = world.add(thrown);
 
   jfpx::HingeJoint hinge;
   hinge.a = world.add(body(jfpx::Box{{Real(0.5), 1, Real(0.05)}}, {-3, 1, 0}, 20, {kLevel}));
@@ -151,6 +172,8 @@ int main() {
   }
   std::printf("the belt has carried the parcel by %.1f m\n",
               static_cast<double>(world.state(parcel).position.x + 3));
+  std::printf("the ball lies on the ledge at y = %.2f m\n",
+              static_cast<double>(world.state(ball).position.y));
   std::printf("the loudest impact had %.1f m/s\n", static_cast<double>(loudest));
   const jfpx::Vec3 drawn = interpolate(before, after, accumulator / kDt);
   std::printf("the player is drawn at z = %.2f m\n", static_cast<double>(drawn.z));

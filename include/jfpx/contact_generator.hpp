@@ -1,16 +1,19 @@
 /// Contact generators: user-defined contacts (thesis 4.3), for example ropes, rods and other limits
-/// on the distance of two bodies.
+/// on the distance of two bodies, and changes of the contacts that were detected.
 #pragma once
 
 #include <jfpx/step_view.hpp>
 
 #include <concepts>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 
 struct Contact;
+class ContactChanges;
 
 /// Identifies a contact generator of one World. Never reused.
 struct ContactGeneratorId {
@@ -31,14 +34,39 @@ struct GeneratedContact {
   Real restitution = 0;   ///< [-], in [0, 1]
 };
 
+/// A detected contact of a step before it is solved: of two bodies, or of two parts of them. Only
+/// the last three members may be changed.
+struct DetectedContact {
+  BodyId a = {}, b = {};  ///< as in Contact
+  /// Number of the part in Compound::parts, of the triangle in TriangleMesh::triangles() or, as in
+  /// HeightfieldDef, of the triangle of a heightfield; 0 for other shapes.
+  std::uint32_t part_a = 0, part_b = 0;
+  Vec3 normal = {};      ///< [-], unit, from b to a
+  Vec3 point = {};       ///< [m], world: the middle of the overlap or gap, at the deepest point
+  Real distance = 0;     ///< [m], of the deepest point; > 0: a gap that may close during the step
+  Real friction = 0;     ///< [-], >= 0; before: that of the pair
+  Real restitution = 0;  ///< [-], in [0, 1]; before: that of the pair
+  /// Whether the solver ignores the contact. It is then not in World::contacts(), has no event and
+  /// wakes no body.
+  bool ignored = false;
+};
+
 /// Read access to the world for a contact generator, and recipient of its contacts. Generators run
 /// after contact detection (with Solver::worst_first, after integration). Valid during the call, in
 /// the calling thread.
 class JFPX_API ContactContext : public StepView {
  public:
-  ContactContext(const BodyStore& bodies, double time, std::vector<Contact>* contacts)
-      : StepView(bodies, time), contacts_(contacts) {}
+  ContactContext(const BodyStore& bodies, double time, std::vector<Contact>* contacts,
+                 ContactChanges* changes)
+      : StepView(bodies, time), contacts_(contacts), changes_(changes) {}
 
+  /// The detected contacts, without those of sensors. The first call in a step makes the list, in
+  /// time proportional to its length. Contacts of two spheres precede all others; both are sorted
+  /// by (a.index, b.index), then by parts. The changes of all generators are checked and used after
+  /// the last one: InvalidArgument for a material out of its range undoes the step. As long as a
+  /// generator ignores a contact of a movable and a fixed body, continuous collision ignores the
+  /// pair, too.
+  std::span<DetectedContact> detected();
   /// Adds a contact. A contact of two bodies of mass 0 is ignored. An awake body wakes the other.
   /// @throws InvalidArgument for an id of no living body, or a field out of its range; the step is
   ///   then undone
@@ -46,6 +74,7 @@ class JFPX_API ContactContext : public StepView {
 
  private:
   std::vector<Contact>* contacts_;
+  ContactChanges* changes_;
 };
 
 /// Any object callable with a ContactContext. Calls in the same state must have the same result,

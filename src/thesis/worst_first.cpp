@@ -78,10 +78,14 @@ void WorstFirst::find_contacts(WorldAccess::Impl* world, StepReport* report) {
   world->contacts.last.get([&](ContactList* list) {
     const BodyStore& store = world->store;
     list->contacts.clear();
-    report->sphere_contacts = search_.find_contacts(store, &world->contact_finder, &list->contacts);
-    report->contacts = list->detected = list->contacts.size();
+    std::size_t spheres = search_.find_contacts(store, &world->contact_finder, &list->contacts);
+    list->detected = list->contacts.size();
     set_materials(BodiesOfStep(store), world->scene.materials, world->pool.get(), &list->contacts);
+    world->contacts.changes.start(&list->contacts);
     world->call_generators(&list->contacts, report);
+    world->contacts.changes.apply(&list->detected, &spheres);
+    report->sphere_contacts = spheres;
+    report->contacts = list->detected;
   });
   world->finish_detection(report);
 }

@@ -5,6 +5,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/bodies/state_hash.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bodies/sub_shape_table.cpp
   ${CMAKE_CURRENT_LIST_DIR}/character/character.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_changes.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_context.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_events.cpp
   ${CMAKE_CURRENT_LIST_DIR}/contacts/contact_finder.cpp

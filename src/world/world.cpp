@@ -59,26 +59,30 @@ void World::Impl::finish_detection(StepReport* report) {
   report->device_failure = contact_finder.collider().device_failure();
 }
 
-/// Detection of Solver::soft_step. Builds the list of contacts only if there are generators.
+/// Detection of Solver::soft_step, and the contact generators.
 void World::Impl::find_contacts(StepReport* report) {
   soft_step::ContactSet& set = soft_step.contacts();
   DetectedContacts& found = contacts.detected;
   const std::size_t spheres =
       contact_finder.find_speculative_contacts(store, scene.soft_step.speculative_margin,
                                                pool.get(), soft_step.last_contacts(), &set, &found);
-  report->sphere_contacts = spheres + found.sphere_count;
-  report->contacts = spheres + found.contacts.size();
   keep_motion(&found);
   found.generated.clear();
+  found.any_own_material = false;
+  set.sphere_materials.clear();
   if (ranks != nullptr) {
     contact_exchange::share_detected(&ranks->domain(), contact_finder.crossing_spheres(), &set);
   }
-  if (generators.ids().empty()) return;
-  ContactList& list = *contacts.last.storage();
-  contacts.maker.make(found, set.view(), false, BodiesOfStep(store), scene.materials, &list);
-  call_generators(&list.contacts, report);
-  const auto generated = std::span(list.contacts).subspan(list.detected);
-  found.generated.assign(generated.begin(), generated.end());
+  ignored_pairs.clear();
+  std::size_t ignored_spheres = 0;
+  if (!generators.ids().empty()) {
+    contacts.changes.start(store, scene.materials, pool.get(), &set, &found);
+    call_generators(&found.generated, report);
+    ignored_spheres = contacts.changes.apply(&ignored_pairs);
+  }
+  soft_step.ignore(ignored_pairs);
+  report->sphere_contacts = spheres - ignored_spheres + found.sphere_count;
+  report->contacts = spheres - ignored_spheres + found.contacts.size();
 }
 
 /// Keeps the motion at the start of the step for lists of contacts.
@@ -96,10 +100,10 @@ void World::Impl::keep_motion(DetectedContacts* found) {
   keep(store.moving.angular_velocity, &found->angular_velocity);
 }
 
-/// Calls the contact generators, which append to the list of contacts.
+/// Calls the contact generators, which append to a list and use `contacts.changes`.
 void World::Impl::call_generators(std::vector<Contact>* list, StepReport* report) {
   const std::size_t count = list->size();
-  ContactContext context(store, time(), list);
+  ContactContext context(store, time(), list, &contacts.changes);
   generators.call(context);
   report->generated_contacts = list->size() - count;
 }

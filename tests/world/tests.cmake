@@ -34,6 +34,7 @@ jfpx_add_test(world_test THESIS SOURCES
   world/closest_body_test.cpp
   world/contact_events_test.cpp
   world/contact_forces_test.cpp
+  world/contact_changes_test.cpp
   world/contact_generator_test.cpp
   world/conveyor_test.cpp
   world/cylinder_world_test.cpp

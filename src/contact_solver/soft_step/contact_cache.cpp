@@ -167,10 +167,12 @@ void ContactCache::drop_forgotten() noexcept {
     if (has_rolling) set.rolling_impulses[kept] = set.rolling_impulses[i];
     set.colors[kept++] = set.colors[i];
   };
+  const bool has_materials = !set.sphere_materials.empty();
   for (std::uint32_t i = 0; i < spheres; ++i) {
     if (involved(set.spheres[i].key)) continue;
     set.spheres[kept] = set.spheres[i];
     set.impulses[kept] = set.impulses[i];
+    if (has_materials) set.sphere_materials[kept] = set.sphere_materials[i];
     keep_contact(i);
   }
   kept_spheres = kept;
@@ -182,6 +184,7 @@ void ContactCache::drop_forgotten() noexcept {
     set.manifolds[kept_manifolds++] = set.manifolds[m];
   }
   set.spheres.resize(kept_spheres);
+  if (has_materials) set.sphere_materials.resize(kept_spheres);
   set.manifolds.resize(kept_manifolds);
   if (set.has_rolling()) set.rolling_impulses.resize(kept);
   set.colors.resize(kept);

@@ -25,6 +25,13 @@ struct ContactKey {
   friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
 };
 
+/// Material of a contact that replaces the combined material of the bodies.
+struct OwnMaterial {
+  Real friction = -1;    ///< [-], >= 0; < 0: not set
+  Real restitution = 0;  ///< [-], in [0, 1]
+  JFPX_HD bool is_set() const { return friction >= 0; }
+};
+
 /// Two spheres that touch, or that may touch during the step.
 struct SphereContactInput {
   ContactKey key;
@@ -45,8 +52,7 @@ struct ManifoldInput {
   ContactKey key;
   Vec3 normal;                         ///< unit, from b to a
   std::uint32_t first = 0, count = 0;  ///< range of points
-  /// [-], of a generated contact; for other contacts, combined from those of the bodies
-  Real friction = 0, restitution = 0;
+  OwnMaterial material;                ///< set for generated contacts
   TestedPoses tested;
 };
 using PointInput = detail::SolverPoint;
@@ -72,6 +78,7 @@ struct ContactView {
   Vec3* rolling_impulses = nullptr;
   std::uint8_t* colors = nullptr;  ///< by contact
   std::uint32_t sphere_count = 0, manifold_count = 0, point_count = 0;
+  const OwnMaterial* sphere_materials = nullptr;  ///< by contact of spheres; null: none is set
 
   JFPX_HD std::uint32_t size() const { return sphere_count + manifold_count; }
   JFPX_HD bool is_sphere(std::uint32_t contact) const { return contact < sphere_count; }
@@ -83,6 +90,10 @@ struct ContactView {
   }
   JFPX_HD const Vec3& normal(std::uint32_t contact) const {
     return is_sphere(contact) ? spheres[contact].normal : manifold(contact).normal;
+  }
+  JFPX_HD OwnMaterial own_material(std::uint32_t contact) const {
+    if (!is_sphere(contact)) return manifold(contact).material;
+    return sphere_materials != nullptr ? sphere_materials[contact] : OwnMaterial{};
   }
   /// Distance of a point of a contact. A contact of two spheres has point 0 only.
   JFPX_HD Real distance(std::uint32_t contact, std::uint32_t point) const {
@@ -116,6 +127,7 @@ struct ContactSet {
   std::vector<KeptImpulse> impulses;
   std::vector<Vec3> rolling_impulses;  ///< empty if no body has rolling or spinning friction
   std::vector<std::uint8_t> colors;
+  std::vector<OwnMaterial> sphere_materials;  ///< by contact of spheres; empty if none is set
 
   std::uint32_t size() const {
     return static_cast<std::uint32_t>(spheres.size() + manifolds.size());
@@ -134,7 +146,8 @@ struct ContactSet {
             colors.data(),
             static_cast<std::uint32_t>(spheres.size()),
             static_cast<std::uint32_t>(manifolds.size()),
-            static_cast<std::uint32_t>(points.size())};
+            static_cast<std::uint32_t>(points.size()),
+            sphere_materials.empty() ? nullptr : sphere_materials.data()};
   }
 };
 

@@ -96,8 +96,10 @@ struct RowSetup {
     const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
     // A body that is still asleep does not touch the other body: the contact has no effect.
     if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return kNoRow;
-    // The arms of a generated contact are not multiples of the normal.
-    if (contacts.impulse_count(contact) != 1 || key.is_generated()) return kKindOf<ManifoldRow>;
+    // The arms of a generated contact, which has a material, are not multiples of the normal.
+    if (contacts.impulse_count(contact) != 1 || contacts.own_material(contact).is_set()) {
+      return kKindOf<ManifoldRow>;
+    }
     if (((a | b) & BodyTraits::kRolls) != 0) return kKindOf<ManifoldRow>;
     return (a & b & BodyTraits::kIsRound) != 0 ? kKindOf<SphereRow> : kKindOf<ManifoldRow>;
   }
@@ -181,20 +183,21 @@ struct RowSetup {
     row->b = flipped ? key.a : key.b;
     row->count = contacts.impulse_count(contact);
     row->normal = flipped ? -normal : normal;
-    Real restitution = 0;
-    if (key.is_generated()) {
-      row->friction = contacts.manifold(contact).friction;
-      row->rolling_friction = row->spinning_friction = 0;
-      restitution = contacts.manifold(contact).restitution;
-    } else {
+    const OwnMaterial own = contacts.own_material(contact);
+    Real restitution = own.restitution;
+    row->friction = own.friction;
+    if (!own.is_set()) {
       row->friction = combined(properties.rules.friction, properties.friction[row->a],
                                properties.friction[row->b]);
+      restitution = combined(properties.rules.restitution, properties.restitution[row->a],
+                             properties.restitution[row->b]);
+    }
+    row->rolling_friction = row->spinning_friction = 0;
+    if (!key.is_generated()) {
       row->rolling_friction =
           std::max(properties.rolling_friction[row->a], properties.rolling_friction[row->b]);
       row->spinning_friction =
           std::max(properties.spinning_friction[row->a], properties.spinning_friction[row->b]);
-      restitution = combined(properties.rules.restitution, properties.restitution[row->a],
-                             properties.restitution[row->b]);
     }
     const bool rolls = row->rolling_friction > 0 || row->spinning_friction > 0;
     const Vec3 rolling =

@@ -84,8 +84,12 @@ struct BodyView : MotionColumns<ConstPointerColumn>,
     return !filters_in_use || (jfpx::may_collide(filter[a], filter[b]) && !is_ignored(a, b));
   }
   JFPX_HD bool is_ignored(std::uint32_t a, std::uint32_t b) const {
-    const std::uint64_t key = a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a;
+    const std::uint64_t key = key_of(a, b);
     return has_pair(ignored, ignored_count, key) || has_pair(joined, joined_count, key);
+  }
+  /// As in IgnoredPairs.
+  JFPX_HD static std::uint64_t key_of(std::uint32_t a, std::uint32_t b) {
+    return a < b ? std::uint64_t{a} << 32 | b : std::uint64_t{b} << 32 | a;
   }
   /// Binary search in sorted keys of pairs.
   JFPX_HD static bool has_pair(const std::uint64_t* keys, std::uint32_t count, std::uint64_t key) {

@@ -284,7 +284,7 @@ void ContactFinder::Part::add(const BodyStore& bodies, const CandidateManifold& 
   if (found.point_count == 0) return;
   const auto first = static_cast<std::uint32_t>(points.size());
   points.insert(points.end(), found.points, found.points + found.point_count);
-  manifolds.push_back({found.key, found.normal, first, found.point_count, 0, 0, found.tested});
+  manifolds.push_back({found.key, found.normal, first, found.point_count, {}, found.tested});
 }
 
 /// Calls find(first, last, part) for the chunks of [0, count) from any thread, then

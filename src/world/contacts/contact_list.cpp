@@ -6,6 +6,7 @@
 #include "src/base/parallel_append.hpp"
 #include "src/base/parallel_for.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
+#include "src/world/contacts/contact_changes.hpp"
 #include "src/world/contacts/merge_contacts.hpp"
 
 #include <span>
@@ -98,6 +99,7 @@ void ContactListMaker::make(const DetectedContacts& detected, const ContactView&
   if (with_begun) append_begun(detected, contacts, bodies, &all);
   merge_by_bodies(middle - begin, std::span(all).subspan(begin), &merged_);
   set_materials(bodies, rules, pool_, &all);
+  set_own_materials(detected, contacts, pool_, &all);
   list->detected = all.size();
   all.insert(all.end(), detected.generated.begin(), detected.generated.end());
 }

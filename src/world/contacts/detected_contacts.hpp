@@ -17,6 +17,7 @@ struct DetectedContacts {
   std::vector<Contact> contacts;
   std::size_t sphere_count = 0;    ///< number of contacts of two spheres in `contacts`
   std::vector<Contact> generated;  ///< contacts of contact generators
+  bool any_own_material = false;   ///< whether a generator has changed the material of a contact
   std::vector<Vec3> position;      ///< [m], by body, at the start of the step
   /// [m/s], [rad/s], by body, at the start of the step; only in worlds with hit events
   std::vector<Vec3> velocity, angular_velocity;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "src/base/lazy.hpp"
+#include "src/world/contacts/contact_changes.hpp"
 #include "src/world/contacts/contact_events.hpp"
 #include "src/world/contacts/contact_list.hpp"
 #include "src/world/contacts/contacts_by_body.hpp"
@@ -57,6 +58,7 @@ struct StepContacts {
   Lazy<ContactList> last, before;
   DetectedContacts detected, detected_before;  ///< of the same steps, unless on a device
   ContactListMaker maker;
+  ContactChanges changes;                  ///< of the step in progress
   ContactsByBody by_body;                  ///< of `last`
   ContactEvents events;                    ///< of both
   Lazy<std::vector<ContactForce>> forces;  ///< of the contacts of `last`

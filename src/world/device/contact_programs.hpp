@@ -299,8 +299,8 @@ struct ShapeProgram {
         });
     for (std::uint32_t i = first; i != kNone; i = d.next_candidate[i]) {
       const CandidateManifold& found = d.tested[i];
-      d.now().view.manifolds[manifold++] = {found.key, found.normal, point, found.point_count, 0,
-                                            0,         found.tested};
+      d.now().view.manifolds[manifold++] = {found.key,         found.normal, point,
+                                            found.point_count, {},           found.tested};
       for (std::uint32_t k = 0; k < found.point_count; ++k, ++point) {
         if (point >= d.capacity.points) continue;
         // Copies the members, because the padding of a point is not initialized.

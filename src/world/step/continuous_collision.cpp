@@ -13,8 +13,13 @@ void SoftStep::stop_fast_bodies(const BodyStore& bodies, const SubShapeView& sub
                                 std::span<const std::uint32_t> tested) {
   const std::span<const std::uint32_t> mobile = moved(bodies);
   std::uint32_t any_fast = 0;
-  ContinuousCollision{step_, sub_shapes, trees, ranks_ == nullptr ? nullptr : tested.data(),
-                      static_cast<std::uint32_t>(tested.size())}
+  ContinuousCollision{step_,
+                      sub_shapes,
+                      trees,
+                      ranks_ == nullptr ? nullptr : tested.data(),
+                      static_cast<std::uint32_t>(tested.size()),
+                      ignored_.keys().data(),
+                      static_cast<std::uint32_t>(ignored_.keys().size())}
       .run(
           PoolTeam(pool_), static_cast<std::uint32_t>(mobile.size()),
           [mobile](std::uint32_t i) { return mobile[i]; }, &any_fast);

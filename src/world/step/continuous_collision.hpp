@@ -32,6 +32,9 @@ struct ContinuousCollision {
   /// The sub-shapes of the bodies that are tested; null: all.
   const SubShape* tested = nullptr;
   std::uint32_t tested_count = 0;
+  /// Keys of IgnoredPairs whose contacts are ignored in the step, sorted.
+  const std::uint64_t* ignored = nullptr;
+  std::uint32_t ignored_count = 0;
 
   /// Stops all bodies that would pass a fixed body.
   /// @param mobile   function from a number below `count` to a body; all movable bodies
@@ -229,7 +232,8 @@ struct ContinuousCollision {
 
   JFPX_HD bool may_stop(std::uint32_t body, SubShape fixed) const {
     const std::uint32_t other = sub_shapes.body(fixed);
-    return bodies().sensor[other] == 0 && bodies().may_collide(body, other);
+    return bodies().sensor[other] == 0 && bodies().may_collide(body, other) &&
+           !BodyView::has_pair(ignored, ignored_count, BodyView::key_of(body, other));
   }
 
   /// In the axes of the solid, whose motion is part of the path. A body that touches a kinematic

@@ -61,7 +61,7 @@ void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> g
     set.points.push_back({c.point - bodies.moving.position[c.a.index],
                           c.point - bodies.moving.position[c.b.index], c.distance, 0, 0});
     const ContactKey key{c.a.index, c.b.index, ContactKey::kGenerated, i};
-    set.manifolds.push_back({key, c.normal, point, 1, c.friction, c.restitution, {}});
+    set.manifolds.push_back({key, c.normal, point, 1, {c.friction, c.restitution}, {}});
   }
   std::ranges::sort(set.manifolds, by_key);
   // Numbered per pair of bodies, so that a new or missing contact does not renumber other pairs.
@@ -73,6 +73,10 @@ void SoftStep::add_generated(const BodyStore& bodies, std::span<const Contact> g
     key.part_b = same_pair ? before->part_b + 1 : 0;
     before = &key;
   }
+}
+
+void SoftStep::ignore(std::span<const BodyPair> pairs) {
+  if (!pairs.empty() || !ignored_.empty()) ignored_.assign(pairs);
 }
 
 /// Sizes all buffers, so that commit() does not allocate.

@@ -43,6 +43,8 @@ class SoftStep {
   Real inverse_h() const { return constants_.inverse_h; }  ///< [1/s], of a substep
   /// Adds the contacts of contact generators.
   void add_generated(const BodyStore& bodies, std::span<const Contact> generated);
+  /// Excludes pairs from the continuous collision of the step in progress.
+  void ignore(std::span<const BodyPair> pairs);
   /// Computes the motion of the step. Wakes bodies and updates accelerations. Forces must have been
   /// summed before.
   /// @returns the first body for which is_in_world() is false, if any
@@ -121,6 +123,7 @@ class SoftStep {
   std::vector<std::uint32_t> parent_;               ///< by body: soft_step::DisjointSets::parent
   std::vector<std::uint8_t> marked_;                ///< by label of an island
   Partition partition_;
+  IgnoredPairs ignored_;  ///< of the continuous collision
 };
 
 }  // namespace JFPX_ABI
