@@ -39,13 +39,14 @@ struct GeneratedContact {
 struct DetectedContact {
   BodyId a = {}, b = {};  ///< as in Contact
   /// Number of the part in Compound::parts, of the triangle in TriangleMesh::triangles() or, as in
-  /// HeightfieldDef, of the triangle of a heightfield; 0 for other shapes.
+  /// HeightfieldDef, of the triangle of a heightfield; 0 for other shapes and with
+  /// Solver::worst_first.
   std::uint32_t part_a = 0, part_b = 0;
   Vec3 normal = {};      ///< [-], unit, from b to a
   Vec3 point = {};       ///< [m], world: the middle of the overlap or gap, at the deepest point
   Real distance = 0;     ///< [m], of the deepest point; > 0: a gap that may close during the step
-  Real friction = 0;     ///< [-], >= 0; before: that of the pair
-  Real restitution = 0;  ///< [-], in [0, 1]; before: that of the pair
+  Real friction = 0;     ///< [-], >= 0; at first that of the pair
+  Real restitution = 0;  ///< [-], in [0, 1]; at first that of the pair
   /// Whether the solver ignores the contact. It is then not in World::contacts(), has no event and
   /// wakes no body.
   bool ignored = false;
@@ -62,10 +63,11 @@ class JFPX_API ContactContext : public StepView {
 
   /// The detected contacts, without those of sensors. The first call in a step makes the list, in
   /// time proportional to its length. Contacts of two spheres precede all others; both are sorted
-  /// by (a.index, b.index), then by parts. The changes of all generators are checked and used after
-  /// the last one: InvalidArgument for a material out of its range undoes the step. As long as a
-  /// generator ignores a contact of a movable and a fixed body, continuous collision ignores the
-  /// pair, too.
+  /// by (a.index, b.index), then by parts. Solver::worst_first has an item for each point of a
+  /// contact. Later generators see the changes of earlier ones; the changes are checked and used
+  /// after the last one: InvalidArgument for an invalid material, or another changed member, undoes
+  /// the step. In steps in which all contacts of a movable and a fixed body are ignored, continuous
+  /// collision ignores the pair, too.
   std::span<DetectedContact> detected();
   /// Adds a contact. A contact of two bodies of mass 0 is ignored. An awake body wakes the other.
   /// @throws InvalidArgument for an id of no living body, or a field out of its range; the step is

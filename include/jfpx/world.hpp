@@ -65,8 +65,8 @@ struct Contact {
   /// [m], world: the middle of the overlap, or a point of b if the contact began during the step
   Vec3 point;
   Real distance = 0;     ///< [m], <= 0: negative penetration depth; 0 if it began in the step
-  Real friction = 0;     ///< [-], >= 0, of the pair
-  Real restitution = 0;  ///< [-], in [0, 1], of the pair
+  Real friction = 0;     ///< [-], >= 0, of the pair, or as a contact generator has set it
+  Real restitution = 0;  ///< [-], in [0, 1], likewise
   /// Whether a or b is a sensor; the contact is then not resolved. False for contacts of contact
   /// generators.
   bool sensor = false;

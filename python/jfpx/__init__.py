@@ -10,6 +10,7 @@ from ._character import CharacterHit, CharacterMove, CharacterSettings, Characte
 from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,
                         PeriodicRows, Rows, SphereCollider, available_backends, find_contacts,
                         find_pairs)
+from ._contact_generators import ContactContext, DetectedContacts
 from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Error, FileError,
                       InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
@@ -30,8 +31,8 @@ __version__ = "0.3.0"
 __all__ = [
     "Attachment", "BEGIN", "BackendUnavailable", "BallJoint", "BodyDistance", "BodyDistances", "BodyId",
     "BodyState", "Bungee", "Buoyancy", "CharacterHit", "CharacterMove", "CharacterSettings", "CharacterState",
-    "Closed", "ConcurrentUse", "ContactEvents", "ContactForces", "ContactRows", "Contacts", "DebugLines",
-    "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError", "FixedJoint", "ForceContext", "Gravity",
+    "Closed", "ConcurrentUse", "ContactContext", "ContactEvents", "ContactForces", "ContactRows", "Contacts", "DebugLines",
+    "DetectedContacts", "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError", "FixedJoint", "ForceContext", "Gravity",
     "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene", "InvalidSnapshot", "JointId", "JointState",
     "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows", "PeriodicContacts", "PeriodicNearest",
     "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording", "RecordingWriter", "Rows", "STAY",

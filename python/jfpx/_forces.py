@@ -194,11 +194,8 @@ class Explosion:
             *_numbers(self, "start", "peak_force", "speed", "thickness", "duration"))
 
 
-class ForceContext:
-    """The world at the start of a step, for a force that is a function of Python. Valid during the
-    call: afterwards, every use raises InvalidArgument. Contributions affect awake bodies only. They
-    are not checked: a value that is not finite undoes the step, and sets StepReport.non_finite. A
-    body is unknown if its id is not of a living body of the world."""
+class _StepView:
+    """The world during a step, for a function of Python."""
 
     def __init__(self, core: Any, dtype: Any) -> None:
         self._core = core
@@ -238,6 +235,13 @@ class ForceContext:
     def awake(self, body: BodyId) -> bool:
         """Whether a body is awake. Raises InvalidArgument for an unknown body."""
         return self._core.awake(_arrays.body(body))
+
+
+class ForceContext(_StepView):
+    """The world at the start of a step, for a force that is a function of Python. Valid during the
+    call: afterwards, every use raises InvalidArgument. Contributions affect awake bodies only. They
+    are not checked: a value that is not finite undoes the step, and sets StepReport.non_finite. A
+    body is unknown if its id is not of a living body of the world."""
 
     def wake(self, body: BodyId) -> None:
         """Wakes a movable body. Raises InvalidArgument for an unknown body."""

@@ -66,16 +66,19 @@ class RecordingWriter(_FileWriter):
         if world._core.steps() != 0:
             raise InvalidArgument("the world has made steps; a recording begins with a new world, "
                                   "such as World(world.scene)")
-        self._refuse_forces(world)
+        self._refuse_functions(world)
         core = _arrays.precision_of(world.dtype)
         self._writer = core.RecordingWriter(_arrays.path(path), world._core)
         self._world = world
         self._steps = 0
 
     @staticmethod
-    def _refuse_forces(world: World) -> None:
+    def _refuse_functions(world: World) -> None:
         if world.forces:
             raise InvalidArgument("the world has forces of add_force(), which a recording does not "
+                                  "contain; record a world without them")
+        if world.contact_generators:
+            raise InvalidArgument("the world has contact generators, which a recording does not "
                                   "contain; record a world without them")
 
     def append(self) -> None:
@@ -94,7 +97,7 @@ class RecordingWriter(_FileWriter):
             As World.states().
         """
         world = self._world
-        self._refuse_forces(world)
+        self._refuse_functions(world)
         made = world._core.steps() - self._steps
         if made != 1 and self._writer.is_open():
             raise InvalidArgument(f"the world has made {made} steps since the last append(); append "

@@ -14,6 +14,7 @@ import numpy as np
 from . import _arrays, _device, mpi
 from ._character import CharacterHit, CharacterMove, CharacterSettings, CharacterState
 from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
+from ._contact_generators import ContactContext
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
 from ._joints import JointId, JointState, arguments, joint_of
 from ._scene import Scene, no_gravity
@@ -1050,6 +1051,36 @@ class World:
         """Numbers of the forces, in the order in which they act."""
         return self._core.forces()
 
+    def add_contact_generator(self, generator: Callable[[ContactContext], Any]) -> int:
+        """Adds a contact generator, and returns its number. Wakes all bodies. Steps of a world with
+        contact generators run on the CPU.
+
+        Parameters
+        ----------
+        generator : function
+            Is called with a ContactContext in every step, after contact detection. It adds contacts,
+            or changes those that were detected. Calls in the same state must have the same result.
+            It must not use the world. Its exceptions undo the step and are raised by step().
+
+        Raises
+        ------
+        InvalidArgument
+            `generator` is not a function, or several ranks hold the world.
+        """
+        _arrays.function(generator, "generator")
+        return self._core.add_contact_generator(
+            functools.partial(_call_generator, generator, self._dtype))
+
+    def remove_contact_generator(self, number: int) -> None:
+        """Removes the contact generator with a number of add_contact_generator(), and wakes all
+        bodies. Raises InvalidArgument for an unknown number."""
+        self._core.remove_contact_generator(_arrays.count(number, "contact generator", 0, 2**64 - 1))
+
+    @property
+    def contact_generators(self) -> list[int]:
+        """Numbers of the contact generators, in the order in which they act."""
+        return self._core.contact_generators()
+
     # Contacts and queries
 
     def contacts(self) -> WorldContacts:
@@ -1504,6 +1535,10 @@ def _report(fields: tuple[Any, ...]) -> StepReport:
 
 def _call(force: Callable[[ForceContext], Any], dtype: Any, context: Any) -> None:
     force(ForceContext(context, dtype))
+
+
+def _call_generator(generator: Callable[[ContactContext], Any], dtype: Any, context: Any) -> None:
+    generator(ContactContext(context, dtype))
 
 
 def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:

@@ -8,25 +8,6 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-/// Calls a function of Python, which the PythonWorld owns.
-class PythonForce {
- public:
-  explicit PythonForce(PyObject* function) : function_(function) {}
-  void operator()(ForceContext& context) const {
-    const nb::gil_scoped_acquire acquire;
-    const nb::object argument = nb::cast(FunctionContext{&context}, nb::rv_policy::move);
-    struct Invalidate {
-      const nb::object& argument;
-      ~Invalidate() { nb::inst_ptr<FunctionContext>(argument)->context = nullptr; }
-    } const invalidate{argument};
-    const nb::handle function = function_;
-    function(argument);
-  }
-
- private:
-  PyObject* function_;
-};
-
 std::optional<BodyId> to_id(const std::optional<IdTuple>& id) {
   if (!id) return std::nullopt;
   return python::to_id(*id);
@@ -51,48 +32,23 @@ std::uint64_t add_spring(PythonWorld& self, const AttachmentTuple& a, const Atta
 }
 
 void bind_context(nb::module_& module) {
-  nb::class_<FunctionContext>(module, "ForceContext")
-      .def_prop_ro("dt", [](const FunctionContext& self) { return self.get().dt(); })
-      .def_prop_ro("time", [](const FunctionContext& self) { return self.get().time(); })
-      .def("size", [](const FunctionContext& self) { return self.get().bodies().size(); })
-      .def("bodies",
-           [](const FunctionContext& self) {
-             std::vector<IdTuple> ids;
-             for (const BodyId id : self.get().bodies()) ids.push_back(to_tuple(id));
-             return ids;
-           })
-      .def("state",
-           [](const FunctionContext& self, IdTuple id) {
-             const BodyState s = self.get().state(python::to_id(id));
-             return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation),
-                                   to_triple(s.velocity), to_triple(s.angular_velocity));
-           })
-      .def("write_states",
-           [](const FunctionContext& self, const Rows<Real>& positions,
-              const Rows<Real>& orientations, const Rows<Real>& velocities,
-              const Rows<Real>& angular_velocities) {
-             std::vector<BodyState> states;
-             for (const BodyId id : self.get().bodies()) states.push_back(self.get().state(id));
-             fill({positions, orientations, velocities, angular_velocities}, states);
-           })
-      .def("mass", [](const FunctionContext& self,
-                      IdTuple id) { return self.get().mass(python::to_id(id)); })
-      .def("awake", [](const FunctionContext& self,
-                       IdTuple id) { return self.get().awake(python::to_id(id)); })
-      .def("wake", [](FunctionContext& self, IdTuple id) { self.get().wake(python::to_id(id)); })
+  using Self = FunctionContext<ForceContext>;
+  nb::class_<Self> context(module, "ForceContext");
+  bind_step_view(context);
+  context.def("wake", [](Self& self, IdTuple id) { self.get().wake(python::to_id(id)); })
       .def("apply_force",
-           [](FunctionContext& self, IdTuple id, Triple force) {
+           [](Self& self, IdTuple id, Triple force) {
              self.get().apply_force(python::to_id(id), to_vec3(force));
            })
       .def("apply_torque",
-           [](FunctionContext& self, IdTuple id, Triple torque) {
+           [](Self& self, IdTuple id, Triple torque) {
              self.get().apply_torque(python::to_id(id), to_vec3(torque));
            })
       .def("apply_force_at_point",
-           [](FunctionContext& self, IdTuple id, Triple force, Triple point) {
+           [](Self& self, IdTuple id, Triple force, Triple point) {
              self.get().apply_force_at_point(python::to_id(id), to_vec3(force), to_vec3(point));
            })
-      .def("apply_forces", [](FunctionContext& self, const Rows<const Real>& forces) {
+      .def("apply_forces", [](Self& self, const Rows<const Real>& forces) {
         ForceContext& context = self.get();
         for (std::size_t i = 0; i < context.bodies().size(); ++i) {
           context.apply_force(context.bodies()[i], vec3_at(forces, i));
@@ -105,7 +61,7 @@ void bind_context(nb::module_& module) {
 ForceId PythonWorld::add_function(nb::object function) {
   World& world = get();
   functions_.reserve(functions_.size() + 1);
-  const ForceId id = world.add_force(PythonForce(function.ptr()));
+  const ForceId id = world.add_force(PythonFunction(function.ptr()));
   functions_.emplace_back(id, std::move(function));
   return id;
 }

@@ -276,11 +276,13 @@ void PythonWorld::free() noexcept {
   }
   world_.reset();
   functions_.clear();
+  generators_.clear();
   communicator_.reset();
 }
 
 int PythonWorld::traverse(visitproc visit, void* arg) const {
   for (const auto& [id, function] : functions_) Py_VISIT(function.ptr());
+  for (const auto& [id, function] : generators_) Py_VISIT(function.ptr());
   Py_VISIT(communicator_.ptr());
   return 0;
 }
@@ -324,6 +326,7 @@ void bind_world(nb::module_& module) {
   bind_forces(module, world);
   bind_joints(world);
   bind_contacts(world);
+  bind_contact_generators(module, world);
   bind_drawing(world);
   bind_device_states(module, world);
 }

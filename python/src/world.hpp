@@ -79,6 +79,8 @@ class PythonWorld {
 
   ForceId add_function(nb::object function);
   void remove_force(ForceId id);
+  ContactGeneratorId add_generator(nb::object function);
+  void remove_generator(ContactGeneratorId id);
 
   /// Visits the functions and the communicator, for the garbage collector.
   int traverse(visitproc visit, void* arg) const;
@@ -93,24 +95,79 @@ class PythonWorld {
   }
 
   std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
-  nb::object communicator_;                                // likewise
-  std::atomic<bool> in_use_ = false;                       // outlives the communicator's calls
-  Scene scene_;                                            ///< of the constructor
+  std::vector<std::pair<ContactGeneratorId, nb::object>> generators_;  // likewise
+  nb::object communicator_;                                            // likewise
+  std::atomic<bool> in_use_ = false;  // outlives the communicator's calls
+  Scene scene_;                       ///< of the constructor
   std::unique_ptr<World> world_;
   std::uint64_t changes_ = 0;
   std::optional<int> reading_device_;  ///< has work that may read device_states()
 };
 
-/// ForceContext of a call of a function, which is invalid afterwards.
+/// ForceContext or ContactContext of a call of a function, which is invalid afterwards.
+template <class Context>
 struct FunctionContext {
-  ForceContext* context = nullptr;
-  ForceContext& get() const {
+  Context* context = nullptr;
+  Context& get() const {
     if (context == nullptr) {
-      throw InvalidArgument("the context of a force is valid only while the force is called");
+      throw InvalidArgument(
+          "a context is valid only while the function that received it is called");
     }
     return *context;
   }
 };
+
+/// Calls a function of Python, which the PythonWorld owns, with a FunctionContext.
+class PythonFunction {
+ public:
+  explicit PythonFunction(PyObject* function) : function_(function) {}
+
+  template <class Context>
+  void operator()(Context& context) const {
+    const nb::gil_scoped_acquire acquire;
+    const nb::object argument = nb::cast(FunctionContext<Context>{&context}, nb::rv_policy::move);
+    struct Invalidate {
+      const nb::object& argument;
+      ~Invalidate() { nb::inst_ptr<FunctionContext<Context>>(argument)->context = nullptr; }
+    } const invalidate{argument};
+    const nb::handle function = function_;
+    function(argument);
+  }
+
+ private:
+  PyObject* function_;
+};
+
+/// Binds the functions of StepView.
+template <class Context>
+void bind_step_view(nb::class_<FunctionContext<Context>>& context) {
+  using Self = FunctionContext<Context>;
+  context.def_prop_ro("dt", [](const Self& self) { return self.get().dt(); })
+      .def_prop_ro("time", [](const Self& self) { return self.get().time(); })
+      .def("size", [](const Self& self) { return self.get().bodies().size(); })
+      .def("bodies",
+           [](const Self& self) {
+             std::vector<IdTuple> ids;
+             for (const BodyId id : self.get().bodies()) ids.push_back(to_tuple(id));
+             return ids;
+           })
+      .def("state",
+           [](const Self& self, IdTuple id) {
+             const BodyState s = self.get().state(python::to_id(id));
+             return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation),
+                                   to_triple(s.velocity), to_triple(s.angular_velocity));
+           })
+      .def("write_states",
+           [](const Self& self, const Rows<Real>& positions, const Rows<Real>& orientations,
+              const Rows<Real>& velocities, const Rows<Real>& angular_velocities) {
+             std::vector<BodyState> states;
+             for (const BodyId id : self.get().bodies()) states.push_back(self.get().state(id));
+             fill({positions, orientations, velocities, angular_velocities}, states);
+           })
+      .def("mass", [](const Self& self, IdTuple id) { return self.get().mass(python::to_id(id)); })
+      .def("awake",
+           [](const Self& self, IdTuple id) { return self.get().awake(python::to_id(id)); });
+}
 
 /// A report as the tuple jfpx.StepReport, in the order of its fields.
 nb::tuple to_python(const StepReport& report);
@@ -121,6 +178,7 @@ BodyFilter to_filter(const nb::object& filter);
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world);
 void bind_joints(nb::class_<PythonWorld>& world);
 void bind_contacts(nb::class_<PythonWorld>& world);
+void bind_contact_generators(nb::module_& module, nb::class_<PythonWorld>& world);
 void bind_drawing(nb::class_<PythonWorld>& world);
 void bind_device_states(nb::module_& module, nb::class_<PythonWorld>& world);
 

@@ -32,7 +32,8 @@ std::uint64_t ContactSearch::find_contacts(const BodyStore& bodies, ContactFinde
                  &manifold);
     for (std::uint32_t i = 0; i < manifold.touch_count; ++i) {
       const auto& [point, distance] = manifold.touches[i];
-      contacts->push_back({bodies.id(c.a), bodies.id(c.b), manifold.normal, point, distance});
+      contacts->push_back(
+          without_material(bodies.id(c.a), bodies.id(c.b), manifold.normal, point, distance));
     }
   }
   return sphere_contacts;
@@ -62,7 +63,8 @@ void ContactSearch::find_sphere_pairs(const BodyStore& bodies, ContactFinder* fi
     const SphereContact& c = found[hit.index];
     const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(c.b));
     const Vec3 normal = hit.pair.sub_shape_a == c.a ? c.normal : -c.normal;
-    contacts->push_back({bodies.id(hit.pair.a), bodies.id(hit.pair.b), normal, point, c.distance});
+    contacts->push_back(
+        without_material(bodies.id(hit.pair.a), bodies.id(hit.pair.b), normal, point, c.distance));
   }
 }
 

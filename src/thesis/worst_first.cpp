@@ -81,9 +81,10 @@ void WorstFirst::find_contacts(WorldAccess::Impl* world, StepReport* report) {
     std::size_t spheres = search_.find_contacts(store, &world->contact_finder, &list->contacts);
     list->detected = list->contacts.size();
     set_materials(BodiesOfStep(store), world->scene.materials, world->pool.get(), &list->contacts);
-    world->contacts.changes.start(&list->contacts);
+    world->contacts.changes.start(&list->contacts, list->detected);
     world->call_generators(&list->contacts, report);
-    world->contacts.changes.apply(&list->detected, &spheres);
+    world->contacts.changes.apply(&spheres);
+    list->detected = list->contacts.size() - report->generated_contacts;
     report->sphere_contacts = spheres;
     report->contacts = list->detected;
   });

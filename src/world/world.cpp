@@ -63,26 +63,27 @@ void World::Impl::finish_detection(StepReport* report) {
 void World::Impl::find_contacts(StepReport* report) {
   soft_step::ContactSet& set = soft_step.contacts();
   DetectedContacts& found = contacts.detected;
+  contact_finder.set_keeps_keys(!generators.ids().empty());
   const std::size_t spheres =
       contact_finder.find_speculative_contacts(store, scene.soft_step.speculative_margin,
                                                pool.get(), soft_step.last_contacts(), &set, &found);
   keep_motion(&found);
   found.generated.clear();
-  found.any_own_material = false;
   set.sphere_materials.clear();
-  if (ranks != nullptr) {
-    contact_exchange::share_detected(&ranks->domain(), contact_finder.crossing_spheres(), &set);
-  }
-  ignored_pairs.clear();
-  std::size_t ignored_spheres = 0;
+  ContactChanges::Ignored ignored;
   if (!generators.ids().empty()) {
     contacts.changes.start(store, scene.materials, pool.get(), &set, &found);
     call_generators(&found.generated, report);
-    ignored_spheres = contacts.changes.apply(&ignored_pairs);
+    ignored = contacts.changes.apply();
+    if (ignored.any_manifold) contact_finder.note_empty();
   }
-  soft_step.ignore(ignored_pairs);
-  report->sphere_contacts = spheres - ignored_spheres + found.sphere_count;
-  report->contacts = spheres - ignored_spheres + found.contacts.size();
+  soft_step.ignore(ignored.pairs);
+  contact_finder.complete(&set, pool.get());
+  if (ranks != nullptr) {
+    contact_exchange::share_detected(&ranks->domain(), contact_finder.crossing_spheres(), &set);
+  }
+  report->sphere_contacts = spheres - ignored.touching_spheres + found.sphere_count;
+  report->contacts = spheres - ignored.touching_spheres + found.contacts.size();
 }
 
 /// Keeps the motion at the start of the step for lists of contacts.

@@ -309,9 +309,8 @@ struct World::Impl {
   bool bodies_changed = true;  ///< whether contact_finder.set_bodies() must be called
   Lazy<QueryTree> query_tree;  ///< of the bodies, built by the first query after a change
   StepContacts contacts{pool.get()};
-  std::vector<BodyPair> ignored_pairs;  ///< of contacts that generators ignore
-  MotionArrays before;                  ///< state that an undone step restores
-  bool is_saved = false;                ///< whether `before` belongs to the current step
+  MotionArrays before;    ///< state that an undone step restores
+  bool is_saved = false;  ///< whether `before` belongs to the current step
   Real hit_speed = std::numeric_limits<Real>::infinity();  ///< WorldSettings::hit_speed
   std::uint64_t steps = 0;
   /// Number of consecutive last steps without changes after which no body was awake.

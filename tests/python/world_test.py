@@ -573,6 +573,84 @@ def test_a_force_must_not_use_its_world():
         world.step()
 
 
+ICE_AND_ASPHALT = {"bodies": [
+    {"shape": {"type": "compound", "parts": [
+        {"shape": {"type": "box", "half_extents": [8, 0.5, 3]}, "position": [0, -0.5, -3]},
+        {"shape": {"type": "box", "half_extents": [8, 0.5, 3]}, "position": [0, -0.5, 3]}]}, "mass": 0},
+    *({"shape": {"type": "box", "half_extents": [0.5, 0.1, 0.5]}, "mass": 1, "position": [0, 0.1, z],
+       "velocity": [4, 0, 0], "can_sleep": False} for z in (-2, 2))]}
+
+
+def test_a_contact_generator_changes_the_friction_of_parts(dtype):
+    world = jfpx.World(ICE_AND_ASPHALT, dtype=dtype)
+    seen = []
+
+    def material(context):
+        contacts = context.detected()
+        seen.append(contacts)
+        context.change(friction=np.where(contacts.parts[1] == 0, 0.1, 0.6), restitution=0)
+        changed = context.detected()
+        np.testing.assert_allclose(changed.friction, [0.1, 0.6])
+        assert context.mass(context.bodies[1]) == 1 and len(context.states().positions) == 3
+
+    number = world.add_contact_generator(material)
+    assert world.contact_generators == [number]
+    world.run(30)
+    assert len(seen) == 30 and seen[0].normal.dtype == dtype
+    np.testing.assert_array_equal(seen[0].pairs, [[1, 2], [0, 0]])
+    np.testing.assert_allclose(seen[0].normal, [[0, 1, 0]] * 2)
+    np.testing.assert_allclose(seen[0].friction, 0.5)
+    np.testing.assert_allclose(world.velocities[1:, 0], [4 - 0.05 * 9.81, 4 - 0.3 * 9.81], atol=0.05)
+    frictions = np.where(world.contacts().point[:, 2] < 0, dtype.type(0.1), dtype.type(0.6))
+    np.testing.assert_array_equal(world.contacts().friction, frictions)
+    world.remove_contact_generator(number)
+    world.step()
+    assert len(seen) == 30 and world.contact_generators == []
+
+
+def test_a_contact_generator_ignores_and_adds_contacts():
+    world = jfpx.World({"bodies": [{**BALL, "position": [0, 0.49, 0]}, GROUND]})
+    ball, ground = world.bodies
+
+    def swap(context):
+        context.change(ignored=True)
+        context.add(ball, ground, (1, 0, 0), context.state(ball).position, -0.1)
+
+    world.add_contact_generator(swap)
+    report = world.step()
+    assert report.contacts == 0 and report.generated_contacts == 1
+    assert world.velocities[0, 0] > 0.1 and world.velocities[0, 1] < -0.1
+
+
+@pytest.mark.parametrize("change, message", [
+    (lambda c: c.change(friction=[1, 2]), "friction has shape"),
+    (lambda c: c.change(friction="x"), "friction"),
+    (lambda c: c.change(ignored=[1]), "ignored has dtype int64; it must be bool"),
+    (lambda c: c.change(friction=-1), "friction is -1"),
+    (lambda c: c.change(restitution=np.full(1, 2.0)), "restitution is 2"),
+    (lambda c: c.add(3, c.bodies[0], (0, 1, 0), (0, 0, 0), 0), "a is 3; it must be a BodyId"),
+    (lambda c: c.add(c.bodies[0], c.bodies[0], (0, 1, 0), (0, 0, 0), 0), "a and b are one body"),
+])
+def test_changes_of_contacts_are_checked(change, message):
+    world = jfpx.World({"bodies": [{**BALL, "position": [0, 0.49, 0]}, GROUND]})
+    before = world.state_hash()
+    world.add_contact_generator(change)
+    with pytest.raises(jfpx.InvalidArgument, match=message):
+        world.step()
+    assert world.state_hash() == before
+
+
+def test_a_contact_context_is_invalid_after_its_call():
+    world = jfpx.World({"bodies": [BALL]})
+    kept = []
+    world.add_contact_generator(kept.append)
+    world.step()
+    with pytest.raises(jfpx.InvalidArgument, match="valid only while"):
+        kept[0].detected()
+    with pytest.raises(jfpx.InvalidArgument, match="generator is 3; it must be a function"):
+        world.add_contact_generator(3)
+
+
 @pytest.mark.parametrize("force, velocity", [
     (jfpx.Gravity((0, 0, 2)), (0, 0, 0.02)),
     (jfpx.Drag(linear=0.5, wind=(4, 0, 0)), (0.02, 0, 0)),
@@ -747,6 +825,10 @@ def test_a_recording_that_could_not_be_repeated_is_refused(tmp_path):
     with pytest.raises(jfpx.InvalidArgument, match="the world has forces"):
         jfpx.RecordingWriter(path, world)
     world.remove_force(force)
+    generator = world.add_contact_generator(lambda context: None)
+    with pytest.raises(jfpx.InvalidArgument, match="the world has contact generators"):
+        jfpx.RecordingWriter(path, world)
+    world.remove_contact_generator(generator)
     with jfpx.RecordingWriter(path, world) as writer:
         with pytest.raises(jfpx.InvalidArgument, match="has made 0 steps"):
             writer.append()

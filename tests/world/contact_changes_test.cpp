@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace jfpx {
@@ -151,7 +153,7 @@ TEST_P(ContactChangesOfSolids, GivePartsOfACompoundAMaterial) {
   EXPECT_NEAR(speeds[1], 4 - 0.6 * test::kG * 0.5, 0.05);
 }
 
-TEST_P(ContactChanges, OfTheRestitutionOfTwoBallsDecideAboutTheirRebound) {
+TEST_P(ContactChanges, SetTheRestitutionOfTwoBalls) {
   BodyDef left = test::ball({-3, 0, 0}), right = test::ball({3, 0, 0});
   left.velocity = {2, 0, 0};
   right.velocity = {-2, 0, 0};
@@ -174,7 +176,7 @@ TEST_P(ContactChanges, OfTheRestitutionOfTwoBallsDecideAboutTheirRebound) {
   EXPECT_NEAR(world.state(ids[1]).velocity.x, 1, 0.01);
 }
 
-TEST_P(ContactChanges, OfIgnoredContactsLeaveBodiesFree) {
+TEST_P(ContactChanges, IgnoreContacts) {
   BodyDef sleeping = test::heavy({0, 1, 0});
   World world(test::on_the_ground({sleeping, test::ball({0, 4, 0}), test::ball({4, 1, 0})}));
   const std::vector<BodyId> ids(world.bodies().begin(), world.bodies().end());
@@ -199,6 +201,99 @@ TEST_P(ContactChanges, OfIgnoredContactsLeaveBodiesFree) {
   world.remove_contact_generator(id);
 }
 
+TEST_P(ContactChanges, OfLaterGeneratorsFollowThoseOfEarlierOnes) {
+  World world(test::on_the_ground({test::heavy({0, 0.99_r, 0}), test::heavy({3, 0.99_r, 0})}));
+  const BodyId first = world.bodies()[0], ground = world.bodies()[2];
+  world.add_contact_generator([=](ContactContext& context) {
+    context.add({.a = first, .b = ground, .normal = {1, 0, 0}, .distance = -0.01_r});
+    for (DetectedContact& contact : context.detected()) {
+      contact.friction = 0.25_r;
+      contact.ignored = true;
+    }
+  });
+  std::vector<Real> seen;
+  world.add_contact_generator([&](ContactContext& context) {
+    seen.clear();
+    for (DetectedContact& contact : context.detected()) {
+      seen.push_back(contact.friction);
+      EXPECT_TRUE(contact.ignored);
+      contact.ignored = contact.a == first || contact.b == first;
+    }
+  });
+  const StepReport report = world.step();
+  EXPECT_EQ(seen, (std::vector<Real>{0.25_r, 0.25_r}));
+  EXPECT_EQ(report.contacts, 1u);
+  EXPECT_EQ(report.generated_contacts, 1u);
+  ASSERT_EQ(world.contacts().size(), 2u);
+  EXPECT_EQ(world.contacts()[0].friction, 0.25_r);
+  EXPECT_EQ(world.contacts()[1].normal, (Vec3{1, 0, 0}));
+}
+
+TEST_P(ContactChanges, AreUndoneByAnException) {
+  const auto scene = test::on_the_ground({test::heavy({0, 0.99_r, 0}), test::heavy({0, 2.9_r, 0})});
+  World world(scene), undisturbed(scene);
+  for (World* w : {&world, &undisturbed}) w->step();
+  const ContactGeneratorId id = world.add_contact_generator([](ContactContext& context) {
+    for (DetectedContact& contact : context.detected()) contact.ignored = true;
+    throw std::runtime_error("no");
+  });
+  EXPECT_THROW(world.step(), std::runtime_error);
+  world.remove_contact_generator(id);
+  for (int n = 0; n < 5; ++n) {
+    world.step();
+    undisturbed.step();
+    ASSERT_EQ(world.states(), undisturbed.states());
+  }
+}
+
+TEST_P(ContactChanges, StayWithTheirContactsWhenABodyIsRemoved) {
+  World world(test::on_the_ground({test::heavy({0, 0.99_r, 0}), test::heavy({0, 2.9_r, 0}),
+                                   test::heavy({5, 0.99_r, 0}), test::heavy({5, 2.9_r, 0})}));
+  world.add_contact_generator([](ContactContext& context) {
+    for (DetectedContact& contact : context.detected()) {
+      contact.friction = 0.1_r * static_cast<Real>(contact.a.index + contact.b.index);
+    }
+  });
+  const std::vector<BodyId> ids(world.bodies().begin(), world.bodies().end());
+  world.step();
+  world.remove(ids[0]);
+  World copy(world.settings());
+  copy.add_contact_generator([](ContactContext&) {});
+  copy.restore(world.snapshot());
+  world.step();
+  bool any = false;
+  for (const Contact& contact : world.contacts()) {
+    EXPECT_EQ(contact.friction, 0.1_r * static_cast<Real>(contact.a.index + contact.b.index));
+    any = true;
+  }
+  EXPECT_TRUE(any);
+}
+
+TEST_P(ContactChanges, FollowASnapshotWithAnotherSolver) {
+  Scene scene = test::on_the_ground({test::heavy({0, 0.99_r, 0}), test::heavy({0, 2.9_r, 0})});
+  scene.solver = Solver::soft_step;
+  World soft(scene);
+  scene.solver = Solver::worst_first;
+  World other(scene);
+  std::size_t listed = 0;
+  for (World* world : {&soft, &other}) {
+    world->add_contact_generator([&listed](ContactContext& context) {
+      listed = context.detected().size();
+      for (DetectedContact& contact : context.detected()) contact.friction = 0.1_r;
+    });
+    world->step();
+  }
+  World& from = GetParam() == Solver::soft_step ? soft : other;
+  World& to = GetParam() == Solver::soft_step ? other : soft;
+  to.restore(from.snapshot());
+  for (int n = 0; n < 3; ++n) {
+    from.step();
+    to.step();
+    ASSERT_EQ(to.states(), from.states());
+    EXPECT_EQ(listed, 2u);
+  }
+}
+
 TEST_P(ContactChanges, AreChecked) {
   const auto complaint = [](const std::function<void(DetectedContact*)>& change) {
     World world(test::on_the_ground({test::heavy({0, 0.99_r, 0})}));
@@ -220,6 +315,11 @@ TEST_P(ContactChanges, AreChecked) {
   EXPECT_EQ(complaint([](DetectedContact* c) { c->restitution = 1.5_r; }),
             "detected contact: restitution is 1.5; it must be in [0, 1]");
   EXPECT_NE(complaint([](DetectedContact* c) { c->friction = test::kNan; }), "");
+  EXPECT_EQ(
+      complaint([](DetectedContact* c) { std::swap(c->a, c->b); }),
+      "detected contact: bodies or parts were changed; only friction, restitution and ignored "
+      "may be");
+  EXPECT_NE(complaint([](DetectedContact* c) { c->a = {}; }), "");
   EXPECT_EQ(complaint([](DetectedContact* c) { c->friction = 3; }), "");
 }
 
@@ -227,21 +327,150 @@ std::vector<Contact> contacts_of(const World& world) {
   return {world.contacts().begin(), world.contacts().end()};
 }
 
-/// Changes a part of the contacts of a random world, by numbers that depend on the bodies only.
-void change_some(ContactContext& context) {
-  for (DetectedContact& contact : context.detected()) {
-    const std::uint32_t number = contact.a.index * 7 + contact.b.index * 3 + contact.part_b;
-    if (number % 5 == 0) contact.friction = 0.9_r;
-    if (number % 7 == 0) contact.restitution = 0.7_r;
-    if (number % 11 == 0) contact.ignored = true;
+// The box covers the seam evenly: each part has half of the contact points.
+TEST_P(ContactChangesOfSolids, ReachThePointsOfTheirPartAtASeam) {
+  CompoundPart left{Box{{8, 0.5_r, 3}}}, right = left;
+  left.position = {0, -0.5_r, -3};
+  right.position = {0, -0.5_r, 3};
+  BodyDef floor;
+  floor.shape = Compound{{left, right}};
+  floor.mass = 0;
+  for (const int ignored_part : {-1, 0, 1}) {
+    World world = test::world_with({box({0, 0.099_r, 0}, {0.5_r, 0.1_r, 0.5_r}), floor});
+    world.add_contact_generator([=](ContactContext& context) {
+      for (DetectedContact& contact : context.detected()) {
+        contact.friction = contact.part_b == 0 ? 0.1_r : 0.6_r;
+        contact.ignored = static_cast<int>(contact.part_b) == ignored_part;
+      }
+    });
+    const StepReport report = world.step();
+    ASSERT_EQ(report.contacts, world.contacts().size());
+    int of_part[2] = {};
+    for (const Contact& contact : world.contacts()) {
+      ++of_part[contact.friction == 0.1_r ? 0 : 1];
+      ASSERT_TRUE(contact.friction == 0.1_r ? contact.point.z < 0.01_r : contact.point.z > -0.01_r);
+    }
+    EXPECT_EQ(of_part[0], ignored_part == 0 ? 0 : 4);
+    EXPECT_EQ(of_part[1], ignored_part == 1 ? 0 : 4);
   }
 }
+
+// A ball falls through an open trap door at the side of a floor, which still stops it.
+TEST_P(ContactChangesOfSolids, OfATrapDoorLeaveTheFloorBesideItSolid) {
+  const BodyDef floor = box({-5, -0.5_r, 0}, {5, 0.5_r, 5}, 0);
+  const BodyDef door = box({5, -0.5_r, 0}, {5, 0.5_r, 5}, 0);
+  BodyDef falling = box({0.2003_r, 0.15_r, 0}, {0.2_r, 0.2_r, 0.2_r});
+  falling.friction = 0;
+  falling.velocity = {-1, -1, 0};
+  World world = test::world_with({floor, door, falling});
+  const std::vector<BodyId> ids(world.bodies().begin(), world.bodies().end());
+  world.add_contact_generator([&](ContactContext& context) {
+    for (DetectedContact& contact : context.detected()) {
+      contact.ignored = contact.a == ids[1] || contact.b == ids[1];
+    }
+  });
+  for (int n = 0; n < 20; ++n) {
+    world.step();
+    ASSERT_GT(world.state(ids[2]).position.x, n == 0 ? 0.19_r : 0.17_r) << n;
+    for (const Contact& contact : world.contacts()) ASSERT_NE(contact.b, ids[1]);
+  }
+  EXPECT_LT(world.state(ids[2]).position.y, -0.5_r);
+}
+
+// The numbers of triangles are those of the definitions, also beside holes.
+TEST_P(ContactChangesOfSolids, KnowTheTrianglesOfSurfaces) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  Random random(seed);
+  HeightfieldDef def{.columns = 9, .rows = 7, .spacing_x = 0.7_r, .spacing_z = 0.9_r};
+  for (int i = 0; i < 63; ++i) def.heights.push_back(random.uniform(-0.1_r, 0.1_r));
+  def.holes = {12, 20, 31};
+  const Heightfield field(def);
+  TriangleMeshDef mesh;
+  for (std::uint32_t n = 0; n < 63; ++n) mesh.vertices.push_back(field.vertex(n / 9, n % 9));
+  for (std::uint32_t n = 0; n < 53; ++n) {
+    if (n % 9 == 8) continue;
+    mesh.triangles.push_back({n + 1, n + 9, n + 10});
+    mesh.triangles.push_back({n, n + 9, n + 1});
+  }
+  for (const bool is_mesh : {false, true}) {
+    Scene scene = test::empty_scene();
+    scene.bodies.emplace_back().mass = 0;
+    scene.bodies[0].shape = is_mesh ? Shape(TriangleMesh(mesh)) : Shape(field);
+    for (int i = 0; i < 30; ++i) {
+      scene.bodies.push_back(
+          test::heavy(random.uniform_in_box({-2.5_r, 0.2_r, -2.5_r}, {2.5_r, 0.4_r, 2.5_r})));
+      scene.bodies.back().shape = Sphere{0.2_r};
+      scene.bodies.back().filter = {.category = 2, .mask = 1};
+    }
+    World world(scene);
+    std::size_t tested = 0;
+    world.add_contact_generator([&](ContactContext& context) {
+      for (const DetectedContact& contact : context.detected()) {
+        const std::uint32_t n = contact.part_b / 2, vertex = contact.part_b % 2 == 0 ? n : n + 10;
+        const auto corners =
+            is_mesh ? mesh.triangles[contact.part_b] : Triangle{vertex, n + 9, n + 1};
+        const Vec3 a = mesh.vertices[corners[0]], b = mesh.vertices[corners[1]];
+        const Vec3 c = mesh.vertices[corners[2]];
+        Vec3 low = a, high = a;
+        for (const Vec3& v : {b, c}) {
+          low = {std::min(low.x, v.x), 0, std::min(low.z, v.z)};
+          high = {std::max(high.x, v.x), 0, std::max(high.z, v.z)};
+        }
+        ASSERT_TRUE(contact.point.x > low.x - 0.1_r && contact.point.x < high.x + 0.1_r);
+        ASSERT_TRUE(contact.point.z > low.z - 0.1_r && contact.point.z < high.z + 0.1_r);
+        ++tested;
+      }
+    });
+    for (int n = 0; n < 40; ++n) world.step();
+    EXPECT_GT(tested, 300u);
+  }
+}
+
+TEST_P(ContactChangesOfSolids, ActOnABallThatSlidesOverATriangle) {
+  TriangleMeshDef def;
+  def.vertices = {{-20, 0, -20}, {-20, 0, 40}, {40, 0, -20}};
+  def.triangles = {{0, 1, 2}};
+  BodyDef floor;
+  floor.shape = TriangleMesh(def);
+  floor.mass = 0;
+  BodyDef ball = test::heavy({0, 0.5_r, 0});
+  ball.shape = Sphere{0.5_r};
+  ball.friction = 0.5_r;
+  ball.velocity = {4, 0, 0};
+  World world = test::world_with({floor, ball});
+  world.add_contact_generator([](ContactContext& context) {
+    for (DetectedContact& contact : context.detected()) contact.friction = 0.1_r;
+  });
+  for (int n = 0; n < 60; ++n) world.step();
+  // It slides for (2 / 7) 4 m/s / (0.1 g) = 1.16 s.
+  EXPECT_NEAR(world.states()[1].velocity.x, 4 - 0.1 * test::kG, 0.03);
+}
+
+/// Changes a part of the contacts of a random world, by numbers that depend on the bodies only.
+struct ChangeSome {
+  int* changed = nullptr;
+
+  void operator()(ContactContext& context) const {
+    for (DetectedContact& contact : context.detected()) {
+      const std::uint32_t number = contact.a.index * 7 + contact.b.index * 3 + contact.part_b;
+      if (number % 3 == 0) contact.friction = 0.9_r;
+      if (number % 4 == 0) contact.restitution = 0.7_r;
+      contact.ignored = number % 5 == 0;
+      if (changed != nullptr && contact.ignored) ++*changed;
+    }
+  }
+};
 
 // A list without changes has no effect; with changes, bits do not depend on threads or snapshots.
 TEST_P(ContactChangesOfSolids, OfRandomWorldsHaveTheSameBits) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
-  for (std::uint64_t run = 0; run < 4; ++run) {
+  int ignored = 0, with_material = 0;
+  const auto is_enough = [&](std::uint64_t runs) {
+    return runs >= 50 || (runs >= 5 && ignored > 0 && with_material > 0);
+  };
+  for (std::uint64_t run = 0; !is_enough(run); ++run) {
     Random random(seed + run);
     const Scene scene = test::random_room(&random);
     World plain(scene), listed(scene);
@@ -249,20 +478,52 @@ TEST_P(ContactChangesOfSolids, OfRandomWorldsHaveTheSameBits) {
     WorldSettings threads;
     threads.threads = 3;
     World changed(scene), parallel(scene, threads);
-    for (World* world : {&changed, &parallel}) world->add_contact_generator(change_some);
-    bool any_ignored = false;
-    for (int n = 0; n < 60; ++n) {
-      const std::size_t all = plain.step().contacts;
+    changed.add_contact_generator(ChangeSome{&ignored});
+    parallel.add_contact_generator(ChangeSome{});
+    for (int n = 0; n < 30; ++n) {
+      plain.step();
       listed.step();
       ASSERT_EQ(listed.states(), plain.states()) << n;
       ASSERT_EQ(contacts_of(listed), contacts_of(plain)) << n;
       const StepReport report = changed.step();
       ASSERT_EQ(report.contacts, changed.contacts().size()) << n;
-      any_ignored |= n == 0 && report.contacts < all;
+      for (const Contact& contact : changed.contacts()) {
+        with_material += !contact.sensor && contact.friction == 0.9_r ? 1 : 0;
+      }
       parallel.step();
       ASSERT_EQ(changed.states(), parallel.states()) << n;
       ASSERT_EQ(contacts_of(changed), contacts_of(parallel)) << n;
-      if (n == 30) parallel.restore(changed.snapshot());
+      if (n % 10 != 0) continue;
+      parallel.restore(changed.snapshot());
+      ASSERT_EQ(contacts_of(changed), contacts_of(parallel)) << n;
+    }
+  }
+  EXPECT_GT(ignored, 0);
+  EXPECT_GT(with_material, 0);
+}
+
+TEST_P(ContactChangesOfSolids, HideIgnoredPairsFromAllLists) {
+  const std::uint64_t seed = test::fresh_seed();
+  SCOPED_TRACE(test::trace(seed));
+  const auto is_ignored = [](BodyId a, BodyId b) { return (a.index + b.index) % 3 == 0; };
+  for (std::uint64_t run = 0; run < 8; ++run) {
+    Random random(seed + run);
+    Scene scene = test::random_room(&random);
+    for (BodyDef& body : scene.bodies) body.sensor = false;
+    WorldSettings settings;
+    settings.hit_speed = 0.01_r;
+    World world(scene, settings);
+    world.add_contact_generator([&](ContactContext& context) {
+      for (DetectedContact& contact : context.detected()) {
+        contact.ignored = is_ignored(contact.a, contact.b);
+      }
+    });
+    for (int n = 0; n < 30; ++n) {
+      world.step();
+      for (const Contact& x : world.contacts()) ASSERT_FALSE(is_ignored(x.a, x.b));
+      for (const ContactEvent& x : world.contact_events()) ASSERT_FALSE(is_ignored(x.a, x.b));
+      for (const HitEvent& x : world.hit_events()) ASSERT_FALSE(is_ignored(x.a, x.b));
+      for (const ContactForce& x : world.contact_forces()) ASSERT_FALSE(is_ignored(x.a, x.b));
     }
   }
 }

@@ -928,17 +928,24 @@ TEST_P(DeviceWorldTest, ContactGeneratorsRunOnTheHost) {
   World host = on_host(scene), device = on_device(scene);
   std::vector<ContactGeneratorId> ids;
   for (World* world : {&host, &device}) {
-    ids.push_back(world->add_contact_generator([](ContactContext&) {}));
+    ids.push_back(world->add_contact_generator([](ContactContext& context) {
+      for (DetectedContact& contact : context.detected()) contact.friction = 0.9_r;
+    }));
   }
-  host.step();
-  device.step();
+  while (host.contacts().empty()) {
+    host.step();
+    device.step();
+    ASSERT_EQ(host.state_hash(), device.state_hash());
+  }
   EXPECT_FALSE(WorldAccess::impl(device).resident());
+  EXPECT_EQ(device.contacts()[0].friction, 0.9_r);
   host.remove_contact_generator(ids[0]);
   device.remove_contact_generator(ids[1]);
   for (int n = 0; n < 50; ++n) {
     host.step();
     device.step();
     ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+    ASSERT_TRUE(std::ranges::equal(host.contacts(), device.contacts())) << "step " << n;
   }
   EXPECT_TRUE(WorldAccess::impl(device).resident());
 }

@@ -25,7 +25,8 @@ struct ContactKey {
   friend auto operator<=>(const ContactKey&, const ContactKey&) = default;
 };
 
-/// Material of a contact that replaces the combined material of the bodies.
+/// Material of a contact that replaces the combined material of the bodies. Not in snapshots, nor
+/// sent between ranks: contact generators set it again in every step, and run with one rank only.
 struct OwnMaterial {
   Real friction = -1;    ///< [-], >= 0; < 0: not set
   Real restitution = 0;  ///< [-], in [0, 1]

@@ -96,7 +96,7 @@ struct RowSetup {
     const std::uint8_t a = properties.traits[key.a], b = properties.traits[key.b];
     // A body that is still asleep does not touch the other body: the contact has no effect.
     if (sleeps(a) || sleeps(b) || ((a | b) & BodyTraits::kActive) == 0) return kNoRow;
-    // The arms of a generated contact, which has a material, are not multiples of the normal.
+    // A SphereRow has the material of its bodies, and arms that are multiples of the normal.
     if (contacts.impulse_count(contact) != 1 || contacts.own_material(contact).is_set()) {
       return kKindOf<ManifoldRow>;
     }

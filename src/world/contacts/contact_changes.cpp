@@ -3,14 +3,13 @@
 #include "src/world/contacts/contact_changes.hpp"
 
 #include <jfpx/contact.hpp>
+#include <jfpx/error.hpp>
 
 #include "src/base/parallel_for.hpp"
 #include "src/base/reserve.hpp"
 #include "src/scene/field_fault.hpp"
 
 #include <algorithm>
-#include <limits>
-#include <utility>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -22,54 +21,32 @@ using soft_step::ManifoldInput;
 using soft_step::OwnMaterial;
 
 constexpr std::size_t kContactsPerListChunk = 1024;
-constexpr std::uint32_t kNoContact = std::numeric_limits<std::uint32_t>::max();
-
-/// Middle of the overlap or gap at a point of a manifold.
-Vec3 middle_of(const ContactView& contacts, const ManifoldInput& manifold, std::uint32_t point,
-               const Vec3& position_b) {
-  const soft_step::PointInput& p = contacts.points[manifold.first + point];
-  return position_b + (p.arm_b + manifold.normal * (p.distance * Real(0.5)));
-}
 
 /// The material of a pair by the rules of the world.
-OwnMaterial material_of(const BodyStore& bodies, const MaterialSettings& rules, std::uint32_t a,
-                        std::uint32_t b) {
-  return {combined(rules.friction, bodies.friction(a), bodies.friction(b)),
-          combined(rules.restitution, bodies.restitution(a), bodies.restitution(b))};
+OwnMaterial material_of(const BodyStore& bodies, const MaterialSettings& rules,
+                        const ContactKey& key) {
+  return {combined(rules.friction, bodies.friction(key.a), bodies.friction(key.b)),
+          combined(rules.restitution, bodies.restitution(key.a), bodies.restitution(key.b))};
 }
 
-/// The number in the set of a contact of World::contacts(). Touching points do not have the number
-/// of their manifold: it is the one of the same bodies with the same normal and the nearest point.
-/// @param position by body [m], at the start of the step
-std::uint32_t number_in_set(const ContactView& contacts, std::span<const Vec3> position,
-                            const Contact& contact) {
-  const std::pair pair(contact.a.index, contact.b.index);
-  const auto pair_of = [](const auto& input) { return std::pair(input.key.a, input.key.b); };
-  const std::span spheres(contacts.spheres, contacts.sphere_count);
-  const auto sphere = std::ranges::lower_bound(spheres, pair, {}, pair_of);
-  if (sphere != spheres.end() && pair_of(*sphere) == pair) {
-    return static_cast<std::uint32_t>(sphere - spheres.begin());
-  }
-  const std::span manifolds(contacts.manifolds, contacts.manifold_count);
-  std::uint32_t nearest = kNoContact;
-  Real least = kMaxReal;
-  auto next = std::ranges::lower_bound(manifolds, pair, {}, pair_of);
-  for (; next != manifolds.end() && pair_of(*next) == pair; ++next) {
-    if (next->key.is_generated() || !(next->normal == contact.normal)) continue;
-    for (std::uint32_t p = 0; p < next->count; ++p) {
-      const Vec3 middle = middle_of(contacts, *next, p, position[pair.second]);
-      const Real distance2 = length_squared(middle - contact.point);
-      if (!(distance2 < least)) continue;
-      least = distance2;
-      nearest = contacts.sphere_count + static_cast<std::uint32_t>(next - manifolds.begin());
-    }
-  }
-  return nearest;
+bool has_material(const DetectedContact& contact, const OwnMaterial& material) {
+  return contact.friction == material.friction && contact.restitution == material.restitution;
 }
 
-void require_valid(const DetectedContact& contact) {
+void check_material(const DetectedContact& contact) {
   require_in_range("detected contact: friction", contact.friction, kNotNegative);
   require_in_range("detected contact: restitution", contact.restitution, kZeroToOne);
+}
+
+void require_unchanged(bool is_unchanged) {
+  if (is_unchanged) return;
+  throw InvalidArgument(
+      "detected contact: bodies or parts were changed; only friction, restitution and ignored may "
+      "be");
+}
+
+BodyPair sorted_pair(const ContactKey& key) {
+  return {std::min(key.a, key.b), std::max(key.a, key.b)};
 }
 
 }  // namespace
@@ -77,6 +54,7 @@ void require_valid(const DetectedContact& contact) {
 void ContactChanges::start(const BodyStore& bodies, const MaterialSettings& rules, ThreadPool* pool,
                            ContactSet* set, DetectedContacts* found) {
   is_made_ = false;
+  contacts_ = nullptr;
   bodies_ = &bodies;
   rules_ = rules;
   pool_ = pool;
@@ -84,9 +62,10 @@ void ContactChanges::start(const BodyStore& bodies, const MaterialSettings& rule
   found_ = found;
 }
 
-void ContactChanges::start(std::vector<Contact>* contacts) {
+void ContactChanges::start(std::vector<Contact>* contacts, std::size_t count) {
   is_made_ = false;
   contacts_ = contacts;
+  count_ = count;
 }
 
 std::span<DetectedContact> ContactChanges::contacts() {
@@ -95,13 +74,19 @@ std::span<DetectedContact> ContactChanges::contacts() {
   return list_;
 }
 
+/// Key of a contact of the set.
+const ContactKey& ContactChanges::key(std::size_t contact) const {
+  const std::size_t spheres = set_->spheres.size();
+  return contact < spheres ? set_->spheres[contact].key : set_->manifolds[contact - spheres].key;
+}
+
 void ContactChanges::make_list() {
   if (contacts_ == nullptr) {
     make_list_of_set();
     return;
   }
   list_.clear();
-  for (const Contact& c : *contacts_) {
+  for (const Contact& c : std::span(*contacts_).first(count_)) {
     if (c.sensor) continue;
     list_.push_back({c.a, c.b, 0, 0, c.normal, c.point, c.distance, c.friction, c.restitution});
   }
@@ -109,138 +94,162 @@ void ContactChanges::make_list() {
 
 void ContactChanges::make_list_of_set() {
   const ContactView contacts = set_->view();
-  const std::vector<Vec3>& position = found_->position;
+  const auto describe = [&](std::uint32_t i) {
+    const ContactKey& key = contacts.key(i);
+    const Vec3& position_b = found_->position[key.b];
+    const OwnMaterial material = material_of(*bodies_, rules_, key);
+    DetectedContact item{bodies_->id(key.a), bodies_->id(key.b), key.part_a, key.part_b,
+                         contacts.normal(i)};
+    item.friction = material.friction;
+    item.restitution = material.restitution;
+    item.distance = contacts.distance(i, 0);
+    if (contacts.is_sphere(i)) {
+      item.point = middle_point(item.normal, item.distance, {position_b, bodies_->radius(key.b)});
+      return item;
+    }
+    std::uint32_t deepest = 0;
+    for (std::uint32_t p = 1; p < contacts.impulse_count(i); ++p) {
+      if (contacts.distance(i, p) < contacts.distance(i, deepest)) deepest = p;
+    }
+    const soft_step::PointInput& point = contacts.points[contacts.manifold(i).first + deepest];
+    item.distance = point.distance;
+    item.point = position_b + (point.arm_b + item.normal * (point.distance * Real(0.5)));
+    return item;
+  };
   resize_geometric(&list_, contacts.size());
-  parallel_for(
-      pool_, contacts.size(), kContactsPerListChunk, [&](std::size_t first, std::size_t last) {
-        for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
-          const ContactKey& key = contacts.key(i);
-          DetectedContact& item = list_[i];
-          item = {bodies_->id(key.a), bodies_->id(key.b), key.part_a, key.part_b,
-                  contacts.normal(i)};
-          const OwnMaterial material = material_of(*bodies_, rules_, key.a, key.b);
-          item.friction = material.friction;
-          item.restitution = material.restitution;
-          if (contacts.is_sphere(i)) {
-            item.distance = contacts.spheres[i].distance;
-            item.point =
-                middle_point(item.normal, item.distance, {position[key.b], bodies_->radius(key.b)});
-            continue;
-          }
-          item.distance = kMaxReal;
-          for (std::uint32_t p = 0; p < contacts.impulse_count(i); ++p) {
-            if (!(contacts.distance(i, p) < item.distance)) continue;
-            item.distance = contacts.distance(i, p);
-            item.point = middle_of(contacts, contacts.manifold(i), p, position[key.b]);
-          }
-        }
-      });
+  parallel_for(pool_, contacts.size(), kContactsPerListChunk,
+               [&](std::size_t first, std::size_t last) {
+                 for (auto i = static_cast<std::uint32_t>(first); i < last; ++i) {
+                   list_[i] = describe(i);
+                 }
+               });
 }
 
-/// Checks the list and gives each contact with a changed material its own.
-void ContactChanges::change_materials() {
-  const std::size_t spheres = set_->spheres.size();
+void ContactChanges::check() const {
   for (std::size_t i = 0; i < list_.size(); ++i) {
     const DetectedContact& item = list_[i];
-    require_valid(item);
-    const OwnMaterial of_bodies = material_of(*bodies_, rules_, item.a.index, item.b.index);
-    if (item.friction == of_bodies.friction && item.restitution == of_bodies.restitution) continue;
-    found_->any_own_material = true;
-    const OwnMaterial own{item.friction, item.restitution};
-    if (i >= spheres) {
-      set_->manifolds[i - spheres].material = own;
-      continue;
-    }
-    if (set_->sphere_materials.empty()) assign_geometric(&set_->sphere_materials, spheres, {});
-    set_->sphere_materials[i] = own;
+    const ContactKey& k = key(i);
+    require_unchanged(item.a == bodies_->id(k.a) && item.b == bodies_->id(k.b) &&
+                      item.part_a == k.part_a && item.part_b == k.part_b);
+    check_material(item);
   }
 }
 
-/// Removes the touching points of ignored contacts from DetectedContacts::contacts.
+/// Gives each contact with a changed material its own.
+void ContactChanges::change_materials() {
+  const std::size_t spheres = set_->spheres.size();
+  changed_.clear();
+  for (std::size_t i = 0; i < list_.size(); ++i) {
+    const DetectedContact& item = list_[i];
+    if (has_material(item, material_of(*bodies_, rules_, key(i)))) continue;
+    const OwnMaterial own{item.friction, item.restitution};
+    if (i < spheres) {
+      if (set_->sphere_materials.empty()) assign_geometric(&set_->sphere_materials, spheres, {});
+      set_->sphere_materials[i] = own;
+    } else {
+      set_->manifolds[i - spheres].material = own;
+      changed_.emplace_back(key(i), own);
+    }
+  }
+  if (changed_.empty()) return;
+  const auto key_of = [](const auto& changed) { return changed.first; };
+  std::ranges::sort(changed_, {}, key_of);
+  for (std::size_t i = 0; i < found_->contacts.size(); ++i) {
+    const auto own = std::ranges::lower_bound(changed_, found_->keys[i], {}, key_of);
+    if (own == changed_.end() || own->first != found_->keys[i]) continue;
+    found_->contacts[i].friction = own->second.friction;
+    found_->contacts[i].restitution = own->second.restitution;
+  }
+}
+
+void ContactChanges::find_ignored_pairs() {
+  const auto by_bodies = [](const BodyPair& x, const BodyPair& y) {
+    return std::pair(x.a, x.b) < std::pair(y.a, y.b);
+  };
+  const auto has_fixed = [&](const ContactKey& k) {
+    return !bodies_->movable(k.a) || !bodies_->movable(k.b);
+  };
+  for (std::size_t i = 0; i < list_.size(); ++i) {
+    if (list_[i].ignored && has_fixed(key(i))) pairs_.push_back(sorted_pair(key(i)));
+  }
+  std::ranges::sort(pairs_, by_bodies);
+  for (std::size_t i = 0; i < list_.size() && !pairs_.empty(); ++i) {
+    if (list_[i].ignored) continue;
+    const auto [first, last] =
+        std::equal_range(pairs_.begin(), pairs_.end(), sorted_pair(key(i)), by_bodies);
+    pairs_.erase(first, last);
+  }
+}
+
+/// Removes the touching points of ignored contacts.
 void ContactChanges::remove_touches() {
-  const ContactView contacts = set_->view();
+  std::ranges::sort(ignored_);
   std::vector<Contact>& touches = found_->contacts;
   std::size_t kept = 0, kept_of_spheres = 0;
   for (std::size_t i = 0; i < touches.size(); ++i) {
-    if (i == found_->sphere_count) kept_of_spheres = kept;
-    const std::uint32_t number = number_in_set(contacts, found_->position, touches[i]);
-    if (number == kNoContact || !list_[number].ignored) touches[kept++] = touches[i];
+    if (std::ranges::binary_search(ignored_, found_->keys[i])) continue;
+    kept_of_spheres += i < found_->sphere_count ? 1 : 0;
+    touches[kept] = touches[i];
+    found_->keys[kept++] = found_->keys[i];
   }
-  if (found_->sphere_count == touches.size()) kept_of_spheres = kept;
-  found_->sphere_count = kept_of_spheres;
   touches.resize(kept);
+  found_->keys.resize(kept);
+  found_->sphere_count = kept_of_spheres;
 }
 
-/// Removes the ignored contacts from the set. @returns the number of touching spheres
-std::size_t ContactChanges::remove_contacts() {
+ContactChanges::Ignored ContactChanges::apply() {
+  pairs_.clear();
+  if (!is_made_) return {};
+  check();
+  change_materials();
+  if (std::ranges::none_of(list_, &DetectedContact::ignored)) return {};
+  find_ignored_pairs();
+  Ignored result;
+  result.pairs = pairs_;
+  ignored_.clear();
   const std::size_t spheres = set_->spheres.size();
-  std::size_t kept = 0, touching = 0;
+  for (std::size_t m = 0; m < set_->manifolds.size(); ++m) {
+    if (!list_[spheres + m].ignored) continue;
+    ignored_.push_back(set_->manifolds[m].key);
+    set_->manifolds[m].count = 0;
+  }
+  result.any_manifold = !ignored_.empty();
+  if (result.any_manifold) remove_touches();
+  std::size_t kept = 0;
+  std::vector<OwnMaterial>& materials = set_->sphere_materials;
   for (std::size_t i = 0; i < spheres; ++i) {
     if (list_[i].ignored) {
-      touching += set_->spheres[i].distance <= 0 ? 1 : 0;
+      result.touching_spheres += set_->spheres[i].distance <= 0 ? 1 : 0;
       continue;
     }
-    if (!set_->sphere_materials.empty()) set_->sphere_materials[kept] = set_->sphere_materials[i];
+    if (!materials.empty()) materials[kept] = materials[i];
     set_->spheres[kept++] = set_->spheres[i];
   }
   set_->spheres.resize(kept);
-  if (!set_->sphere_materials.empty()) set_->sphere_materials.resize(kept);
-  kept = 0;
-  for (std::size_t m = 0; m < set_->manifolds.size(); ++m) {
-    // The points stay where they are, without a contact.
-    if (!list_[spheres + m].ignored) set_->manifolds[kept++] = set_->manifolds[m];
-  }
-  set_->manifolds.resize(kept);
-  return touching;
+  if (!materials.empty()) materials.resize(kept);
+  return result;
 }
 
-std::size_t ContactChanges::apply(std::vector<BodyPair>* ignored) {
-  if (!is_made_) return 0;
-  change_materials();
-  for (const DetectedContact& item : list_) {
-    if (item.ignored) ignored->push_back({item.a.index, item.b.index});
-  }
-  if (ignored->empty()) return 0;
-  remove_touches();
-  return remove_contacts();
-}
-
-void ContactChanges::apply(std::size_t* detected, std::size_t* of_spheres) {
+void ContactChanges::apply(std::size_t* spheres) {
   if (!is_made_) return;
-  for (const DetectedContact& item : list_) require_valid(item);
-  const std::size_t count = *detected, spheres = *of_spheres;
+  std::size_t kept = 0, kept_spheres = 0;
   auto item = list_.begin();
-  std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts_->size(); ++i) {
     Contact& contact = (*contacts_)[i];
-    if (i < count && !contact.sensor) {
+    bool is_kept = true;
+    if (i < count_ && !contact.sensor) {
+      require_unchanged(item->a == contact.a && item->b == contact.b);
+      check_material(*item);
       contact.friction = item->friction;
       contact.restitution = item->restitution;
-      if ((item++)->ignored) {
-        --*detected;
-        if (i < spheres) --*of_spheres;
-        continue;
-      }
+      is_kept = !(item++)->ignored;
     }
+    if (!is_kept) continue;
+    kept_spheres += i < *spheres ? 1 : 0;
     (*contacts_)[kept++] = contact;
   }
   contacts_->resize(kept);
-}
-
-void set_own_materials(const DetectedContacts& detected, const ContactView& contacts,
-                       ThreadPool* pool, std::vector<Contact>* list) {
-  if (!detected.any_own_material) return;
-  parallel_for(pool, list->size(), kContactsPerListChunk, [&](std::size_t first, std::size_t last) {
-    for (Contact& c : std::span(*list).subspan(first, last - first)) {
-      if (c.sensor) continue;
-      const std::uint32_t number = number_in_set(contacts, detected.position, c);
-      if (number == kNoContact) continue;
-      const OwnMaterial own = contacts.own_material(number);
-      if (!own.is_set()) continue;
-      c.friction = own.friction;
-      c.restitution = own.restitution;
-    }
-  });
+  *spheres = kept_spheres;
 }
 
 std::span<DetectedContact> ContactContext::detected() { return changes_->contacts(); }

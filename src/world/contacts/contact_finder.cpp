@@ -247,7 +247,9 @@ void ContactFinder::test_sphere_pairs(const BodyStore& bodies, std::span<const S
       if (touch) ++part->touching_spheres;
     } else if (touch) {
       const Vec3 point = middle_point(c.normal, c.distance, sub_shapes.bounds(pair.b));
-      part->touches.push_back({bodies.id(a), bodies.id(b), c.normal, point, c.distance});
+      part->touches.push_back(
+          without_material(bodies.id(a), bodies.id(b), c.normal, point, c.distance));
+      if (keeps_keys_) part->keys.push_back({a, b});
     }
   }
 }
@@ -273,14 +275,17 @@ struct ContactFinder::Results {
   Refilled<soft_step::ManifoldInput> manifolds;
   Refilled<soft_step::PointInput> points;
   Refilled<Contact> touches;
+  Refilled<soft_step::ContactKey> keys;  ///< of the touches, if they are kept
 };
 
 /// Appends the contact of two sub-shapes.
-void ContactFinder::Part::add(const BodyStore& bodies, const CandidateManifold& found) {
+void ContactFinder::Part::add(const BodyStore& bodies, const CandidateManifold& found,
+                              bool keeps_keys) {
   for (const CandidateManifold::Touch& touch : std::span(found.touches, found.touch_count)) {
-    touches.push_back({bodies.id(found.key.a), bodies.id(found.key.b), found.normal, touch.point,
-                       touch.distance});
+    touches.push_back(without_material(bodies.id(found.key.a), bodies.id(found.key.b), found.normal,
+                                       touch.point, touch.distance));
   }
+  if (keeps_keys) keys.insert(keys.end(), found.touch_count, found.key);
   if (found.point_count == 0) return;
   const auto first = static_cast<std::uint32_t>(points.size());
   points.insert(points.end(), found.points, found.points + found.point_count);
@@ -323,7 +328,7 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
     };
     for (const Candidate& pair : candidates.subspan(first, last - first)) {
       test_candidate(swept_bounds_, pair, recyclable.points.data(), find_last, &found);
-      part->add(bodies, found);
+      part->add(bodies, found, keeps_keys_);
     }
   };
   for_each_batch(pool, candidates.size(),
@@ -336,7 +341,8 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
                    };
                    append(pool, parts, number_points, Appended{&Part::points, &results->points},
                           Appended{&Part::manifolds, &results->manifolds},
-                          Appended{&Part::touches, &results->touches});
+                          Appended{&Part::touches, &results->touches},
+                          Appended{&Part::keys, &results->keys});
                  });
 }
 
@@ -350,7 +356,7 @@ bool ContactFinder::hide_points_of_body(std::span<soft_step::ManifoldInput> run,
   auto pair = std::ranges::lower_bound(candidates_, run.front().key.a, {}, &Candidate::a);
   for (soft_step::ManifoldInput& manifold : run) {
     while (key_of(sub_shapes, *pair) != manifold.key) ++pair;
-    if (!is_polyhedral(sub_shapes, *pair)) continue;
+    if (manifold.count == 0 || !is_polyhedral(sub_shapes, *pair)) continue;
     const SurfaceContact contact{&*pair, manifold.normal, points + manifold.first, manifold.count};
     part->surfaces.push_back({contact, &manifold, 0});
   }
@@ -371,12 +377,11 @@ bool ContactFinder::hide_points_of_body(std::span<soft_step::ManifoldInput> run,
   return any;
 }
 
-/// Removes hidden points from the contacts of candidates_, which begin at number `first`.
-void ContactFinder::hide_points(std::size_t first, Results* results, ThreadPool* pool) {
+/// Removes hidden points from the contacts of candidates_.
+void ContactFinder::hide_points(ContactSet* set, ThreadPool* pool) {
   const BodyView& bodies = swept_bounds_.bodies;
-  const auto manifolds =
-      std::span(*results->manifolds.items).first(results->manifolds.size).subspan(first);
-  soft_step::PointInput* const points = results->points.items->data();
+  const auto manifolds = std::span(set->manifolds).subspan(first_of_candidates_);
+  soft_step::PointInput* const points = set->points.data();
   const auto find = [&](std::size_t begin, std::size_t end, Part* part) {
     // A run of contacts with the same a belongs to the chunk where it begins.
     while (begin > 0 && begin < end && manifolds[begin].key.a == manifolds[begin - 1].key.a) {
@@ -398,23 +403,29 @@ void ContactFinder::hide_points(std::size_t first, Results* results, ThreadPool*
       begin = last;
     }
   };
-  bool any = false;
   for_each_batch(pool, manifolds.size(),
                  chunk_size(manifolds.size(), kFewestCandidates, kCandidatesPerChunk), find,
                  [&](std::span<Part> parts) {
-                   for (const Part& part : parts) any |= part.any_hidden;
+                   for (const Part& part : parts) any_empty_ |= part.any_hidden;
                  });
-  if (!any) return;
-  std::size_t kept = first;
-  std::uint32_t kept_points = manifolds.front().first;
-  for (const soft_step::ManifoldInput& manifold : manifolds) {
+}
+
+/// Removes contacts and points between points after hide_points(), or after a contact was emptied.
+void ContactFinder::remove_empty(ContactSet* set) {
+  if (!std::exchange(any_empty_, false)) return;
+  std::size_t kept = 0;
+  std::uint32_t kept_points = 0;
+  for (const soft_step::ManifoldInput& manifold : set->manifolds) {
     if (manifold.count == 0) continue;
-    std::copy_n(points + manifold.first, manifold.count, points + kept_points);
-    soft_step::ManifoldInput& moved = (*results->manifolds.items)[kept++] = manifold;
+    if (manifold.first != kept_points) {
+      std::copy_n(set->points.begin() + manifold.first, manifold.count,
+                  set->points.begin() + kept_points);
+    }
+    soft_step::ManifoldInput& moved = set->manifolds[kept++] = manifold;
     moved.first = std::exchange(kept_points, kept_points + manifold.count);
   }
-  results->manifolds.size = kept;
-  results->points.size = kept_points;
+  set->manifolds.resize(kept);
+  set->points.resize(kept_points);
 }
 
 std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Real margin,
@@ -426,7 +437,8 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
     sub_shapes_.update_poses(bodies, present_, pool);
   }
   sweep_bounds(bodies, margin, pool);
-  Results results{{&set->spheres}, {&set->manifolds}, {&set->points}, {&detected->contacts}};
+  Results results{
+      {&set->spheres}, {&set->manifolds}, {&set->points}, {&detected->contacts}, {&detected->keys}};
   std::size_t touching_spheres = 0;
   Refilled<Candidate> candidates{&candidates_}, compounds{&compounds_};
   Refilled<std::uint32_t> crossing{&crossing_spheres_};
@@ -449,8 +461,9 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
           }
         };
         append(pool, parts, number_crossing, Appended{&Part::spheres, &results.spheres},
-               Appended{&Part::touches, &results.touches}, Appended{&Part::candidates, &candidates},
-               Appended{&Part::compounds, &compounds}, Appended{&Part::crossing, &crossing});
+               Appended{&Part::touches, &results.touches}, Appended{&Part::keys, &results.keys},
+               Appended{&Part::candidates, &candidates}, Appended{&Part::compounds, &compounds},
+               Appended{&Part::crossing, &crossing});
       });
 
   compounds.finish();
@@ -459,6 +472,9 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
     std::ranges::sort(compounds_);
     test_candidates(bodies, compounds_, recyclable, &results, pool);
     merge_by_bodies(middle, std::span(detected->contacts).first(results.touches.size), &merged_);
+    if (keeps_keys_) {
+      merge_by_bodies(middle, std::span(detected->keys).first(results.keys.size), &merged_keys_);
+    }
   }
   detected->sphere_count = results.touches.size;
 
@@ -480,16 +496,22 @@ std::size_t ContactFinder::find_speculative_contacts(const BodyStore& bodies, Re
                  });
   candidates.finish();
   sort_runs(&candidates_, &merged_candidates_);
-  const std::size_t first_general = results.manifolds.size;
+  first_of_candidates_ = results.manifolds.size;
+  any_empty_ = false;
   test_candidates(bodies, candidates_, recyclable, &results, pool);
-  hide_points(first_general, &results, pool);
   results.spheres.finish();
   crossing.finish();
   results.manifolds.finish();
   results.points.finish();
   results.touches.finish();
-  sort_by_key(pool, &set->manifolds);
+  results.keys.finish();
   return touching_spheres;
+}
+
+void ContactFinder::complete(ContactSet* set, ThreadPool* pool) {
+  hide_points(set, pool);
+  remove_empty(set);
+  sort_by_key(pool, &set->manifolds);
 }
 
 }  // namespace JFPX_ABI

@@ -41,14 +41,22 @@ class ContactFinder {
   /// b. Contact defines which body is a. Friction and restitution are 0. The forces of the step
   /// must have been summed before.
   /// @param margin   [m], >= 0: SoftStepSettings::speculative_margin
+  /// complete() must be called afterwards.
   /// @param recyclable contacts of the last step
-  /// @param set      receives all pairs, each list sorted by key
+  /// @param set      receives all pairs; contacts of two spheres sorted by key
   /// @param detected receives the contacts with distance <= 0 that are not in set->spheres
   /// @returns the number of contacts in set->spheres with distance <= 0
   /// @throws the exceptions of SphereCollider::find_pairs()
   std::size_t find_speculative_contacts(const BodyStore& bodies, Real margin, ThreadPool* pool,
                                         const soft_step::ContactSet& recyclable,
                                         soft_step::ContactSet* set, DetectedContacts* detected);
+
+  /// Whether the next searches fill DetectedContacts::keys.
+  void set_keeps_keys(bool keeps) noexcept { keeps_keys_ = keeps; }
+  /// Marks that manifolds of the last search have no points any more: complete() removes them.
+  void note_empty() noexcept { any_empty_ = true; }
+  /// Removes hidden points and empty contacts of the last search, and sorts the manifolds by key.
+  void complete(soft_step::ContactSet* set, ThreadPool* pool);
 
   /// With several ranks: the sub-shapes before SubShapeRanges::fixed_begin() of the bodies that are
   /// present, ascending.
@@ -82,8 +90,9 @@ class ContactFinder {
     std::vector<soft_step::SphereContactInput> spheres;
     std::vector<soft_step::ManifoldInput> manifolds;
     std::vector<soft_step::PointInput> points;
-    std::size_t touching_spheres = 0;  ///< contacts in `spheres` with distance <= 0
-    std::vector<Contact> touches;      ///< other contacts with distance <= 0
+    std::size_t touching_spheres = 0;         ///< contacts in `spheres` with distance <= 0
+    std::vector<Contact> touches;             ///< other contacts with distance <= 0
+    std::vector<soft_step::ContactKey> keys;  ///< of `touches`, if they are kept
     std::vector<Candidate> candidates, compounds;
     std::vector<std::uint32_t> crossing;  ///< with several ranks: numbers in `spheres`
     /// A contact of a body, and its hidden points (bit i: point i).
@@ -94,8 +103,8 @@ class ContactFinder {
     };
     std::vector<Surface> surfaces;
     bool any_hidden = false;
-    std::array<std::size_t, 5> places{};  ///< of its lists, where they are appended
-    void add(const BodyStore& bodies, const CandidateManifold& found);
+    std::array<std::size_t, 6> places{};  ///< of its lists, where they are appended
+    void add(const BodyStore& bodies, const CandidateManifold& found, bool keeps_keys);
     void clear() {
       spheres.clear();
       crossing.clear();
@@ -103,6 +112,7 @@ class ContactFinder {
       points.clear();
       touching_spheres = 0;
       touches.clear();
+      keys.clear();
       candidates.clear();
       compounds.clear();
       any_hidden = false;
@@ -119,7 +129,8 @@ class ContactFinder {
                        const soft_step::ContactSet& recyclable, Results* results, ThreadPool* pool);
   bool hide_points_of_body(std::span<soft_step::ManifoldInput> run, soft_step::PointInput* points,
                            Part* part) const;
-  void hide_points(std::size_t first, Results* results, ThreadPool* pool);
+  void hide_points(soft_step::ContactSet* set, ThreadPool* pool);
+  void remove_empty(soft_step::ContactSet* set);
   template <class Find, class AppendAll>
   void for_each_batch(ThreadPool* pool, std::size_t count, std::size_t chunk, const Find& find,
                       const AppendAll& append_all);
@@ -149,7 +160,11 @@ class ContactFinder {
   // Of find_speculative_contacts():
   std::vector<Candidate> compounds_;  ///< pairs of spheres, at least one of a compound
   std::vector<Part> parts_;
-  std::vector<Contact> merged_;  ///< copy of the contacts of compounds
+  std::vector<Contact> merged_;                     ///< copy of the contacts of compounds
+  std::vector<soft_step::ContactKey> merged_keys_;  ///< copy of their keys
+  bool keeps_keys_ = false;
+  std::size_t first_of_candidates_ = 0;  ///< first manifold of candidates_
+  bool any_empty_ = false;               ///< whether a manifold has lost points
 };
 
 }  // namespace JFPX_ABI

@@ -6,7 +6,6 @@
 #include "src/base/parallel_append.hpp"
 #include "src/base/parallel_for.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
-#include "src/world/contacts/contact_changes.hpp"
 #include "src/world/contacts/merge_contacts.hpp"
 
 #include <span>
@@ -20,6 +19,13 @@ using soft_step::ContactView;
 
 constexpr std::size_t kContactsPerListChunk = 4096, kContactsPerCountChunk = 512;
 
+/// Sets the material of a contact if a contact generator has set that of its input.
+void set_material(const soft_step::OwnMaterial& own, Contact* contact) {
+  if (!own.is_set()) return;
+  contact->friction = own.friction;
+  contact->restitution = own.restitution;
+}
+
 /// Appends the points of manifolds that began to touch during the step.
 void append_begun(const DetectedContacts& detected, const ContactView& contacts,
                   const BodiesOfStep& bodies, std::vector<Contact>* list) {
@@ -30,7 +36,9 @@ void append_begun(const DetectedContacts& detected, const ContactView& contacts,
     for (std::uint32_t p = 0; p < manifold.count; ++p) {
       if (!soft_step::has_begun(contacts, i, p)) continue;
       const Vec3 point = detected.position[key.b] + contacts.points[manifold.first + p].arm_b;
-      list->push_back({bodies[key.a].id, bodies[key.b].id, manifold.normal, point, 0});
+      list->push_back(
+          without_material(bodies[key.a].id, bodies[key.b].id, manifold.normal, point, 0));
+      set_material(manifold.material, &list->back());
     }
   }
 }
@@ -75,8 +83,9 @@ void ContactListMaker::append_spheres(const DetectedContacts& detected, const Co
     const bool touch = touches(i);
     const Vec3 point =
         touch ? middle_point(normal, distance, sphere_b) : point_on_b(normal, sphere_b);
-    *next++ = {a.id, b.id, normal, point, touch ? distance : Real(0)};
-    return next;
+    *next = without_material(a.id, b.id, normal, point, touch ? distance : Real(0));
+    set_material(contacts.own_material(i), next);
+    return next + 1;
   };
   parallel_append(pool_, contacts.sphere_count, kContactsPerListChunk, count_of, write, &begin_,
                   list);
@@ -92,14 +101,13 @@ void ContactListMaker::make(const DetectedContacts& detected, const ContactView&
   append_spheres(detected, contacts, with_begun, bodies, &all);
   std::size_t middle = all.size();
   all.insert(all.end(), spheres.begin(), spheres.end());
-  merge_by_bodies(middle, all, &merged_);
+  merge_by_bodies(middle, std::span(all), &merged_);
   const std::size_t begin = all.size();
   all.insert(all.end(), others.begin(), others.end());
   middle = all.size();
   if (with_begun) append_begun(detected, contacts, bodies, &all);
   merge_by_bodies(middle - begin, std::span(all).subspan(begin), &merged_);
   set_materials(bodies, rules, pool_, &all);
-  set_own_materials(detected, contacts, pool_, &all);
   list->detected = all.size();
   all.insert(all.end(), detected.generated.begin(), detected.generated.end());
 }
@@ -109,8 +117,10 @@ void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules, Th
   parallel_for(pool, contacts->size(), 1024, [&](std::size_t first, std::size_t last) {
     for (Contact& c : std::span(*contacts).subspan(first, last - first)) {
       const ListedBody a = bodies[c.a.index], b = bodies[c.b.index];
-      c.friction = combined(rules.friction, a.friction, b.friction);
-      c.restitution = combined(rules.restitution, a.restitution, b.restitution);
+      if (c.friction < 0) {
+        c.friction = combined(rules.friction, a.friction, b.friction);
+        c.restitution = combined(rules.restitution, a.restitution, b.restitution);
+      }
       c.sensor = a.sensor || b.sensor;
     }
   });

@@ -56,7 +56,8 @@ struct BegunCounts {
 BegunCounts count_begun_contacts(const soft_step::ContactView& contacts, const Domain* domain,
                                  ThreadPool* pool);
 
-/// Sets the fields of detected contacts that follow from the properties of their bodies.
+/// Sets the fields of detected contacts that follow from the properties of their bodies: the
+/// materials of those of without_material(), and Contact::sensor.
 JFPX_API void set_materials(const BodiesOfStep& bodies, const MaterialSettings& rules,
                             ThreadPool* pool, std::vector<Contact>* contacts);
 

@@ -117,8 +117,8 @@ class ContactBuffers {
     detected->generated.clear();
     detected->sphere_count = 0;
     for (const Touch& t : touches) {
-      detected->contacts.push_back(
-          {bodies[t.pair.a].id, bodies[t.pair.b].id, t.normal, t.point, t.distance});
+      detected->contacts.push_back(without_material(bodies[t.pair.a].id, bodies[t.pair.b].id,
+                                                    t.normal, t.point, t.distance));
       detected->sphere_count += t.of_spheres;
     }
   }
