@@ -65,7 +65,8 @@ class ContactContext(_StepView):
         Parameters
         ----------
         friction, restitution : array (E,), a number or None
-            New values, >= 0 and in [0, 1], in the order of detected(). None: no change.
+            New values, >= 0 and in [0, 1], in the order of detected(), which are converted to the
+            dtype of the world. None: no change.
         ignored : array (E,) of bool, a bool or None
             Whether the solver ignores a contact. It is then not in World.contacts(), has no event
             and wakes no body.
@@ -116,5 +117,7 @@ class ContactContext(_StepView):
                        _arrays.number(restitution, "restitution"))
 
     def _values(self, values: Any, name: str, size: int) -> np.ndarray:
+        if hasattr(values, "dtype"):
+            values = _arrays.converted(values, name, self._dtype)
         array = _arrays.vector(values, name, size, self._dtype)
         return np.ascontiguousarray(np.broadcast_to(array, (size,)))

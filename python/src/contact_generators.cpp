@@ -8,17 +8,18 @@ inline namespace JFPX_ABI {
 namespace python {
 namespace {
 
-using Self = FunctionContext<ContactContext>;
+using GeneratorContext = FunctionContext<ContactContext>;
 
 /// @throws InvalidArgument if the size of an array is not that of the list
-void require_size(const Vector<const Real>& array, std::span<const DetectedContact> contacts) {
+void require_one_for_each(const Vector<const Real>& array,
+                          std::span<const DetectedContact> contacts) {
   if (array.shape(0) == contacts.size()) return;
   throw InvalidArgument("an array has " + std::to_string(array.shape(0)) +
                         " values; it must have one for each of " + std::to_string(contacts.size()) +
                         " detected contacts");
 }
 
-void write_detected(const Self& self, const Rows<std::int64_t>& pairs,
+void write_detected(const GeneratorContext& self, const Rows<std::int64_t>& pairs,
                     const Rows<std::int64_t>& parts, const Rows<Real>& normals,
                     const Rows<Real>& points, const Vector<Real>& distances,
                     const Vector<Real>& frictions, const Vector<Real>& restitutions) {
@@ -37,33 +38,36 @@ void write_detected(const Self& self, const Rows<std::int64_t>& pairs,
   }
 }
 
-void set_values(const Self& self, const Vector<const Real>& values, Real DetectedContact::*member) {
+void set_values(const GeneratorContext& self, const Vector<const Real>& values,
+                Real DetectedContact::*member) {
   const std::span<DetectedContact> contacts = self.get().detected();
-  require_size(values, contacts);
+  require_one_for_each(values, contacts);
   for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].*member = values(i);
 }
 
-void bind_context(nb::module_& module) {
-  nb::class_<Self> context(module, "ContactContext");
+void bind_contact_context(nb::module_& module) {
+  nb::class_<GeneratorContext> context(module, "ContactContext");
   bind_step_view(context);
-  context.def("detected_count", [](const Self& self) { return self.get().detected().size(); })
+  context
+      .def("detected_count",
+           [](const GeneratorContext& self) { return self.get().detected().size(); })
       .def("write_detected", &write_detected)
       .def("set_frictions",
-           [](const Self& self, const Vector<const Real>& values) {
+           [](const GeneratorContext& self, const Vector<const Real>& values) {
              set_values(self, values, &DetectedContact::friction);
            })
       .def("set_restitutions",
-           [](const Self& self, const Vector<const Real>& values) {
+           [](const GeneratorContext& self, const Vector<const Real>& values) {
              set_values(self, values, &DetectedContact::restitution);
            })
       .def("set_ignored",
-           [](const Self& self, const Vector<const Real>& values) {
+           [](const GeneratorContext& self, const Vector<const Real>& values) {
              const std::span<DetectedContact> contacts = self.get().detected();
-             require_size(values, contacts);
+             require_one_for_each(values, contacts);
              for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].ignored = values(i) != 0;
            })
-      .def("add", [](const Self& self, IdTuple a, IdTuple b, Triple normal, Triple point,
-                     Real distance, Real friction, Real restitution) {
+      .def("add", [](const GeneratorContext& self, IdTuple a, IdTuple b, Triple normal,
+                     Triple point, Real distance, Real friction, Real restitution) {
         self.get().add({.a = python::to_id(a),
                         .b = python::to_id(b),
                         .normal = to_vec3(normal),
@@ -90,7 +94,7 @@ void PythonWorld::remove_generator(ContactGeneratorId id) {
 }
 
 void bind_contact_generators(nb::module_& module, nb::class_<PythonWorld>& world) {
-  bind_context(module);
+  bind_contact_context(module);
   world
       .def("add_contact_generator",
            [](PythonWorld& self, nb::object function) {

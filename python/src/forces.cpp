@@ -31,11 +31,11 @@ std::uint64_t add_spring(PythonWorld& self, const AttachmentTuple& a, const Atta
       .number;
 }
 
-void bind_context(nb::module_& module) {
+void bind_force_context(nb::module_& module) {
   using Self = FunctionContext<ForceContext>;
-  nb::class_<Self> context(module, "ForceContext");
-  bind_step_view(context);
-  context.def("wake", [](Self& self, IdTuple id) { self.get().wake(python::to_id(id)); })
+  nb::class_<Self> binding(module, "ForceContext");
+  bind_step_view(binding);
+  binding.def("wake", [](Self& self, IdTuple id) { self.get().wake(python::to_id(id)); })
       .def("apply_force",
            [](Self& self, IdTuple id, Triple force) {
              self.get().apply_force(python::to_id(id), to_vec3(force));
@@ -72,7 +72,7 @@ void PythonWorld::remove_force(ForceId id) {
 }
 
 void bind_forces(nb::module_& module, nb::class_<PythonWorld>& world) {
-  bind_context(module);
+  bind_force_context(module);
   world
       .def("add_function",
            [](PythonWorld& self, nb::object function) {

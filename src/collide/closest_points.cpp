@@ -126,7 +126,7 @@ ClosestPair find_closest(const ConvexCore& target, const ConvexCore& solid, cons
   return result;
 }
 
-ClosestPair find_closest(const PosedSolid& target, const PosedSolid& solid, Real limit) {
+ClosestPair find_closest(const PlacedSolid& target, const PlacedSolid& solid, Real limit) {
   const Transform& at = target.pose;
   const Mat3 rotation = transposed(at.basis) * solid.pose.basis;
   const Vec3 offset = inverse_transform_point(at, solid.pose.origin);
@@ -141,7 +141,7 @@ ClosestPair find_closest(const PosedSolid& target, const PosedSolid& solid, Real
   return pair;
 }
 
-ClosestPair find_closest(const HalfSpace& target, const PosedSolid& solid, Real limit) {
+ClosestPair find_closest(const HalfSpace& target, const PlacedSolid& solid, Real limit) {
   const Wide n(target.normal);
   const WideMatrix axes(solid.pose.basis);
   const Wide lowest =
@@ -155,7 +155,7 @@ ClosestPair find_closest(const HalfSpace& target, const PosedSolid& solid, Real 
   return pair;
 }
 
-ClosestPair find_closest(const MeshView& mesh, const Transform& mesh_pose, const PosedSolid& solid,
+ClosestPair find_closest(const MeshView& mesh, const Transform& mesh_pose, const PlacedSolid& solid,
                          const Vec3& half_extents, Real limit) {
   const Mat3 rotation = transposed(mesh_pose.basis) * solid.pose.basis;
   const Vec3 from = inverse_transform_point(mesh_pose, solid.pose.origin);
@@ -202,13 +202,13 @@ ClosestPoints to_points(const detail::ClosestPair& pair) {
 
 ClosestPoints closest_points(const SolidShape& a, const Transform& pose_a, const SolidShape& b,
                              const Transform& pose_b) {
-  return to_points(detail::find_closest(detail::PosedSolid(b, pose_b),
-                                        detail::PosedSolid(a, pose_a), kUnlimited));
+  return to_points(detail::find_closest(detail::PlacedSolid(b, pose_b),
+                                        detail::PlacedSolid(a, pose_a), kUnlimited));
 }
 
 ClosestPoints closest_points(const SolidShape& solid, const Transform& pose,
                              const HalfSpace& half_space) {
-  return to_points(detail::find_closest(half_space, detail::PosedSolid(solid, pose), kUnlimited));
+  return to_points(detail::find_closest(half_space, detail::PlacedSolid(solid, pose), kUnlimited));
 }
 
 }  // namespace JFPX_ABI

@@ -26,12 +26,12 @@ ClosestPair find_closest(const ConvexCore& target, const ConvexCore& solid, cons
                          const Vec3& offset, Real limit);
 
 /// A solid with its core.
-struct PosedSolid {
+struct PlacedSolid {
   SolidShape shape;  ///< owns what the core refers to
   Transform pose;
   ConvexCore core;
 
-  PosedSolid(const SolidShape& solid, const Transform& at)
+  PlacedSolid(const SolidShape& solid, const Transform& at)
       : shape(solid),
         pose(at),
         core(std::visit([](const auto& s) { return make_core(s); }, shape)) {}
@@ -39,16 +39,16 @@ struct PosedSolid {
 
 /// The closest points of two solids, in world axes. If the cores overlap, the axis of collide() is
 /// used, unless that of find_closest() is better.
-ClosestPair find_closest(const PosedSolid& target, const PosedSolid& solid, Real limit);
+ClosestPair find_closest(const PlacedSolid& target, const PlacedSolid& solid, Real limit);
 
 /// The closest points of a half-space and a solid, in world axes.
-ClosestPair find_closest(const HalfSpace& target, const PosedSolid& solid, Real limit);
+ClosestPair find_closest(const HalfSpace& target, const PlacedSolid& solid, Real limit);
 
 /// The closest points of a solid and the triangles of a mesh, in world axes. A one-sided triangle
 /// counts if the centre of the solid is in front of it. Of triangles at the same distance, the one
 /// with the lowest number counts. If a triangle overlaps or touches the solid, the distance is 0.
 /// @param half_extents [m], of the solid in the axes of the mesh
-ClosestPair find_closest(const MeshView& mesh, const Transform& mesh_pose, const PosedSolid& solid,
+ClosestPair find_closest(const MeshView& mesh, const Transform& mesh_pose, const PlacedSolid& solid,
                          const Vec3& half_extents, Real limit);
 
 }  // namespace detail

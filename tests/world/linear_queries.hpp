@@ -249,7 +249,7 @@ class LinearQueries {
   template <class S>
   static detail::ClosestPair closest_to(const SolidShape& shape, const Transform& at,
                                         const S& target, const Transform& pose) {
-    const detail::PosedSolid solid(shape, at);
+    const detail::PlacedSolid solid(shape, at);
     constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
     if constexpr (std::is_same_v<S, HalfSpace>) {
       return detail::find_closest(target, solid, kUnlimited);
@@ -280,7 +280,7 @@ class LinearQueries {
       closest.normal = normalized(pose.basis * closest.normal);
       return closest;
     } else {
-      return detail::find_closest(detail::PosedSolid(target, pose), solid, kUnlimited);
+      return detail::find_closest(detail::PlacedSolid(target, pose), solid, kUnlimited);
     }
   }
 

@@ -12,13 +12,13 @@ inline namespace JFPX_ABI {
 namespace {
 
 using detail::ClosestPair;
-using detail::PosedSolid;
+using detail::PlacedSolid;
 
-ClosestPair find_gap(const HalfSpace& half_space, const Transform&, const PosedSolid& solid,
+ClosestPair find_gap(const HalfSpace& half_space, const Transform&, const PlacedSolid& solid,
                      Real limit) {
   return detail::find_closest(half_space, solid, limit);
 }
-ClosestPair find_gap(const Plane& plane, const Transform&, const PosedSolid& solid, Real limit) {
+ClosestPair find_gap(const Plane& plane, const Transform&, const PlacedSolid& solid, Real limit) {
   const Vec3 centre = transform_point(solid.pose, solid.core.centre);
   return detail::find_closest(to_wall(plane).solid_for(centre), solid, limit);
 }
@@ -26,7 +26,7 @@ Vec3 half_extents_in(const SolidShape& shape, const Transform& pose) {
   return std::visit([&](const auto& s) { return detail::half_extents(s, pose); }, shape);
 }
 /// The distance of a mesh that the solid overlaps is that of the deepest contact.
-ClosestPair find_gap(const detail::Mesh auto& mesh, const Transform& at, const PosedSolid& solid,
+ClosestPair find_gap(const detail::Mesh auto& mesh, const Transform& at, const PlacedSolid& solid,
                      Real limit) {
   const Transform in_mesh{transposed(at.basis) * solid.pose.basis, {}};
   ClosestPair pair = detail::find_closest(detail::view_of(mesh), at, solid,
@@ -41,8 +41,8 @@ ClosestPair find_gap(const detail::Mesh auto& mesh, const Transform& at, const P
   return pair;
 }
 template <class S>
-ClosestPair find_gap(const S& target, const Transform& at, const PosedSolid& solid, Real limit) {
-  return detail::find_closest(PosedSolid(target, at), solid, limit);
+ClosestPair find_gap(const S& target, const Transform& at, const PlacedSolid& solid, Real limit) {
+  return detail::find_closest(PlacedSolid(target, at), solid, limit);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ class BodyGap {
   std::optional<BodyDistance> to(const BodyStore& bodies, std::uint32_t body, Real limit) const;
 
  private:
-  detail::PosedSolid solid_;
+  detail::PlacedSolid solid_;
   Vec3 half_extents_;
 };
 
