@@ -70,7 +70,7 @@ TEST(TimeChooser, OneAlternativeIsFixed) {
   EXPECT_EQ(chooser.reason(), Reason::fixed);
 }
 
-TEST(TimeChooser, CostsAtMostThreeHundredthsWhereTheModelIsRight) {
+TEST(TimeChooser, CostsAtMostFourHundredthsWhereTheModelIsRight) {
   const Seed seed;
   Random random(seed);
   for (int k = 0; k < 100; ++k) {
@@ -83,7 +83,7 @@ TEST(TimeChooser, CostsAtMostThreeHundredthsWhereTheModelIsRight) {
     TimeChooser chooser(batched(4));
     machine.run(chooser, 5000);
     const double best = *std::min_element(machine.true_us.begin(), machine.true_us.end());
-    ASSERT_LE(machine.spent_us, 1.03 * 5000 * best);
+    ASSERT_LE(machine.spent_us, 1.04 * 5000 * best);
   }
 }
 

@@ -8,6 +8,7 @@
 #include "src/collide/sphere_pair.hpp"
 #include "src/world/bodies/body_store.hpp"
 #include "src/world/bodies/sub_shape_view.hpp"
+#include "src/world/contacts/detected_contacts.hpp"
 
 #include <algorithm>
 #include <tuple>
@@ -149,7 +150,7 @@ class ContactOracle {
            Real distance) {
     found_.push_back(
         {{!(p.is_sphere() && q.is_sphere()), p.body, q.body, p.kind(), p.part, q.kind(), q.part},
-         {bodies_.id(p.body), bodies_.id(q.body), normal, point, distance}});
+         without_material(bodies_.id(p.body), bodies_.id(q.body), normal, point, distance)});
   }
   void add(const SubShape& p, const SubShape& q, const Manifold& m) {
     for (int k = 0; k < m.count; ++k) {

@@ -924,7 +924,7 @@ TEST_P(DeviceWorldTest, ForcesOfAnUndoneStepHaveNoEffect) {
 
 TEST_P(DeviceWorldTest, ContactGeneratorsRunOnTheHost) {
   Scene scene;
-  scene.bodies = {test::ball({0, 2, 0}), test::ball({0.5_r, 4.2_r, 0}), test::ground()};
+  scene.bodies = {test::heavy({0, 1.2_r, 0}), test::heavy({0.5_r, 3.4_r, 0}), test::ground()};
   World host = on_host(scene), device = on_device(scene);
   std::vector<ContactGeneratorId> ids;
   for (World* world : {&host, &device}) {
@@ -932,12 +932,13 @@ TEST_P(DeviceWorldTest, ContactGeneratorsRunOnTheHost) {
       for (DetectedContact& contact : context.detected()) contact.friction = 0.9_r;
     }));
   }
-  while (host.contacts().empty()) {
+  for (int n = 0; n < 20; ++n) {
     host.step();
     device.step();
     ASSERT_EQ(host.state_hash(), device.state_hash());
   }
   EXPECT_FALSE(WorldAccess::impl(device).resident());
+  ASSERT_FALSE(device.contacts().empty());
   EXPECT_EQ(device.contacts()[0].friction, 0.9_r);
   host.remove_contact_generator(ids[0]);
   device.remove_contact_generator(ids[1]);

@@ -64,11 +64,12 @@ struct ContinuousCollision {
   /// Whether the body of a movable sub-shape may have passed a fixed body: its centre has moved
   /// far, and not as predicted. Also if it has moved very far as predicted, for two cases in which
   /// contacts fail: the search may miss a body that touches the seam of a mesh, and a spinning body
-  /// may pass because the arms of its contacts are constant during the step.
+  /// may pass because the arms of its contacts are constant during the step. A body that turns by
+  /// more than a radian in a step may even creep through in small steps.
   JFPX_HD bool is_fast(SubShape i) const {
     /// [-], fractions of the least half width. After less, the centre is still outside, also of a
     /// body that was stopped in the step before.
-    constexpr Real kFar = Real(0.25), kVeryFar = Real(0.5);
+    constexpr Real kFar = Real(0.25), kVeryFar = Real(0.5), kCreep = Real(1. / 64);
     const std::uint32_t body = sub_shapes.body(i);
     if (!bodies().is_active(body)) return false;
     Vec3 motion = step.solver[body].shift, predicted;
@@ -82,11 +83,16 @@ struct ContinuousCollision {
     }
     const Real size2 = size * size, motion2 = length_squared(motion);
     const Real far2 = size2 * (kFar * kFar);
-    if (!(motion2 > far2) || bodies().sensor[body] != 0) return false;
+    const bool is_constrained = turns && step.constrained[body] != 0;
+    const bool spins =
+        is_constrained && length_squared(bodies().angular_velocity[body] * bodies().dt) > 1;
+    if (!(motion2 > (spins ? size2 * (kCreep * kCreep) : far2)) || bodies().sensor[body] != 0) {
+      return false;
+    }
     const bool any_mesh = sub_shapes.ranges.meshes_begin() < sub_shapes.ranges.bounded();
     const bool any_kinematic = trees.kinematic.block_count > 0;
-    if ((any_mesh || any_kinematic || (turns && step.constrained[body] != 0)) &&
-        motion2 > size2 * (kVeryFar * kVeryFar)) {
+    if (spins || ((any_mesh || any_kinematic || is_constrained) &&
+                  motion2 > size2 * (kVeryFar * kVeryFar))) {
       return true;
     }
     predicted += bodies().predicted_motion(body);
