@@ -34,6 +34,14 @@ JFPX_API void advise_huge_pages(void* memory, std::size_t bytes) noexcept;
 /// [bytes] of memory that the machine has.
 JFPX_API std::uint64_t physical_memory() noexcept;
 
+/// Number of cores that the process may use, at least 1: those of its affinity and, on Linux, no
+/// more than the CPU quotas of its control groups allow, rounded up. A container with a quota of
+/// two cores runs on all cores of its machine, but is stopped when it has used the time of two.
+JFPX_API unsigned usable_cores() noexcept;
+/// The cores that the quotas of control groups allow (versions 1 and 2), rounded up, at least 1;
+/// unlimited: the largest number. @param root folder with proc/self/cgroup and sys/fs/cgroup
+JFPX_API unsigned cores_of_quotas(const std::string& root) noexcept;
+
 /// Whether a stream is shown to a person, and moves the cursor by control characters.
 JFPX_API bool is_terminal(std::FILE* stream) noexcept;
 

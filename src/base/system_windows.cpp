@@ -4,14 +4,17 @@
 #include "src/base/atomic_wait.hpp"
 #include "src/base/system.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <cwchar>
 #include <fcntl.h>
 #include <io.h>
+#include <limits>
 #include <process.h>
 #include <system_error>
+#include <thread>
 #include <vector>
 
 #ifndef NOMINMAX
@@ -89,6 +92,11 @@ std::uint64_t physical_memory() noexcept {
   MEMORYSTATUSEX status{};
   status.dwLength = sizeof status;
   return ::GlobalMemoryStatusEx(&status) != 0 ? status.ullTotalPhys : 0;
+}
+
+unsigned usable_cores() noexcept { return std::max(1u, std::thread::hardware_concurrency()); }
+unsigned cores_of_quotas(const std::string&) noexcept {
+  return std::numeric_limits<unsigned>::max();
 }
 
 // _isatty() is also true of the device NUL.

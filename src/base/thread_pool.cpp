@@ -6,6 +6,7 @@
 #include "src/base/atomic_wait.hpp"
 #include "src/base/floating_point.hpp"
 #include "src/base/pause.hpp"
+#include "src/base/system.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -205,7 +206,7 @@ std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::acquire_others(
 /// Whether the process has too few threads for a request: as many as the largest request, or one
 /// per core. More threads would only take the cores from each other.
 bool ThreadPool::Workers::may_start(unsigned threads) {
-  unsigned most = std::max(threads, std::thread::hardware_concurrency());
+  unsigned most = std::max(threads, usable_cores());
   unsigned started = 1;
   for (const Workers* known = list_; known != nullptr; known = known->next_) {
     most = std::max(most, known->requested_);
@@ -222,7 +223,7 @@ std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::start(unsigned threads
 
 ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
   // A polling worker must not take the core of another thread.
-  if (threads <= std::thread::hardware_concurrency()) polls_ = kPolls;
+  if (threads <= usable_cores()) polls_ = kPolls;
   chunks_ = std::make_unique<Chunks[]>(threads);
   workers_.reserve(threads - 1);
   try {
@@ -474,7 +475,7 @@ void ThreadPool::check(unsigned threads) {
 
 ThreadPool::ThreadPool(unsigned threads) {
   check(threads);
-  if (threads == 0) threads = std::clamp(std::thread::hardware_concurrency(), 1u, kMaxThreads);
+  if (threads == 0) threads = std::min(usable_cores(), kMaxThreads);
   if (threads > 1) workers_ = Workers::shared(threads);
 }
 ThreadPool::~ThreadPool() = default;

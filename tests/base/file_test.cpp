@@ -11,9 +11,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <limits>
 #include <optional>
 #include <string>
+#include <thread>
 
 namespace jfpx {
 namespace {
@@ -85,6 +89,41 @@ TEST(System, TheCacheFolderIsThatOfTheUser) {
     EXPECT_TRUE(cache_folder().empty());
   }
 }
+
+#if !defined(_WIN32)
+TEST(System, KnowsTheQuotasOfItsControlGroups) {
+  const test::TemporaryFolder folder;
+  const std::string root = folder.file(".");
+  const auto write = [&](const std::string& path, const std::string& text) {
+    const std::filesystem::path file = root + '/' + path;
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file) << text;
+  };
+  constexpr unsigned kUnlimited = std::numeric_limits<unsigned>::max();
+  EXPECT_EQ(cores_of_quotas(root), kUnlimited) << "no control groups";
+  write("proc/self/cgroup", "0::/pods/one\n");
+  EXPECT_EQ(cores_of_quotas(root), kUnlimited) << "no quotas";
+  write("sys/fs/cgroup/pods/cpu.max", "max 100000\n");
+  EXPECT_EQ(cores_of_quotas(root), kUnlimited);
+  write("sys/fs/cgroup/pods/one/cpu.max", "250000 100000\n");
+  EXPECT_EQ(cores_of_quotas(root), 3u) << "rounded up";
+  write("sys/fs/cgroup/pods/cpu.max", "200000 100000\n");
+  EXPECT_EQ(cores_of_quotas(root), 2u) << "the group that contains it";
+  write("sys/fs/cgroup/cpu.max", "1000 100000\n");
+  EXPECT_EQ(cores_of_quotas(root), 1u) << "in a container, the folder itself";
+  write("proc/self/cgroup", "4:memory:/x\n3:cpu,cpuacct:/docker/x\n2:cpuset:/\n");
+  EXPECT_EQ(cores_of_quotas(root), kUnlimited);
+  write("sys/fs/cgroup/cpu/docker/x/cpu.cfs_quota_us", "-1\n");
+  write("sys/fs/cgroup/cpu/docker/x/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(cores_of_quotas(root), kUnlimited);
+  write("sys/fs/cgroup/cpu/docker/x/cpu.cfs_quota_us", "150000\n");
+  EXPECT_EQ(cores_of_quotas(root), 2u);
+  write("proc/self/cgroup", "damaged\n3:cpu\n0::\n::\n");
+  EXPECT_EQ(cores_of_quotas(root), 1u);
+  EXPECT_GE(usable_cores(), 1u);
+  EXPECT_LE(usable_cores(), std::max(1u, std::thread::hardware_concurrency()));
+}
+#endif
 
 TEST(System, KnowsItsMachine) {
   EXPECT_GT(physical_memory(), std::uint64_t{1} << 26);
