@@ -220,10 +220,12 @@ TEST(PairTests, TransformedPairsHaveTheSameContact) {
 
     const double noise = 400 * kEps;
     expect_transformed(collide(sphere, solid), collide(moved_sphere, moved_solid), world, noise);
-    expect_transformed(collide(sphere, plane), collide(moved_sphere, moved_plane), world, noise);
+    if (absolute(dot(plane.normal, sphere.centre) - plane.offset) > 0.001_r) {  // else the side
+      expect_transformed(collide(sphere, plane), collide(moved_sphere, moved_plane), world, noise);
+    }
     expect_transformed(collide(box, pose, solid), collide(box, world * pose, moved_solid), world,
                        noise);
-    if (absolute(dot(plane.normal, pose.origin) - plane.offset) > 0.001_r) {  // else the side
+    if (absolute(dot(plane.normal, pose.origin) - plane.offset) > 0.001_r) {
       expect_transformed(collide(box, pose, plane), collide(box, world * pose, moved_plane), world,
                          noise);
     }
