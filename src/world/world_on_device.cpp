@@ -161,6 +161,10 @@ void World::Impl::replace(BodyId id, const BodyDef& def) {
   // From here on, nothing throws.
   store.replace(body, def, std::move(prepared));
   soft_step.forget(body);
+  if (store.movable(body)) return;
+  // As the next step would do; a snapshot has no color for them.
+  joints.for_each_of(
+      body, [this](std::uint32_t joint) { joints.last()[joint].color = soft_step::kFixedColor; });
 }
 
 void World::Impl::note_forces() {
