@@ -74,12 +74,11 @@ class RecordingWriter(_FileWriter):
 
     @staticmethod
     def _refuse_functions(world: World) -> None:
-        if world.forces:
-            raise InvalidArgument("the world has forces of add_force(), which a recording does not "
-                                  "contain; record a world without them")
-        if world.contact_generators:
-            raise InvalidArgument("the world has contact generators, which a recording does not "
-                                  "contain; record a world without them")
+        for functions, name in ((world.forces, "forces of add_force()"),
+                                (world.contact_generators, "contact generators")):
+            if functions:
+                raise InvalidArgument(f"the world has {name}, which a recording does not contain; "
+                                      "record a world without them")
 
     def append(self) -> None:
         """Appends the states of the world. Call it once after each step.

@@ -1001,7 +1001,7 @@ class World:
         if not callable(force):
             raise InvalidArgument(f"force is {type(force).__name__}; it must be a force of jfpx "
                                   "or a function")
-        return self._core.add_function(functools.partial(_call, force, self._dtype))
+        return self._core.add_function(functools.partial(_call, force, ForceContext, self._dtype))
 
     def add_joint(self, joint: Any) -> JointId:
         """Adds a joint, which acts from the next step on, and wakes its bodies. Their contacts with
@@ -1069,7 +1069,7 @@ class World:
         """
         _arrays.function(generator, "generator")
         return self._core.add_contact_generator(
-            functools.partial(_call_generator, generator, self._dtype))
+            functools.partial(_call, generator, ContactContext, self._dtype))
 
     def remove_contact_generator(self, number: int) -> None:
         """Removes the contact generator with a number of add_contact_generator(), and wakes all
@@ -1533,12 +1533,8 @@ def _report(fields: tuple[Any, ...]) -> StepReport:
     return report._replace(non_finite_body=BodyId(*report.non_finite_body))
 
 
-def _call(force: Callable[[ForceContext], Any], dtype: Any, context: Any) -> None:
-    force(ForceContext(context, dtype))
-
-
-def _call_generator(generator: Callable[[ContactContext], Any], dtype: Any, context: Any) -> None:
-    generator(ContactContext(context, dtype))
+def _call(function: Callable[[Any], Any], kind: type, dtype: Any, context: Any) -> None:
+    function(kind(context, dtype))
 
 
 def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:

@@ -38,11 +38,14 @@ void write_detected(const GeneratorContext& self, const Rows<std::int64_t>& pair
   }
 }
 
+template <class T>
 void set_values(const GeneratorContext& self, const Vector<const Real>& values,
-                Real DetectedContact::*member) {
+                T DetectedContact::*member) {
   const std::span<DetectedContact> contacts = self.get().detected();
   require_one_for_each(values, contacts);
-  for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].*member = values(i);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    contacts[i].*member = static_cast<T>(values(i));
+  }
 }
 
 void bind_contact_context(nb::module_& module) {
@@ -62,9 +65,7 @@ void bind_contact_context(nb::module_& module) {
            })
       .def("set_ignored",
            [](const GeneratorContext& self, const Vector<const Real>& values) {
-             const std::span<DetectedContact> contacts = self.get().detected();
-             require_one_for_each(values, contacts);
-             for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].ignored = values(i) != 0;
+             set_values(self, values, &DetectedContact::ignored);
            })
       .def("add", [](const GeneratorContext& self, IdTuple a, IdTuple b, Triple normal,
                      Triple point, Real distance, Real friction, Real restitution) {

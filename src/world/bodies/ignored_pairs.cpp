@@ -1,6 +1,8 @@
 /// Changes and queries of a set of pairs.
 #include "src/world/bodies/ignored_pairs.hpp"
 
+#include "src/world/bodies/body_view.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -8,10 +10,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-std::uint64_t key_of(const BodyPair& pair) {
-  const auto [low, high] = std::minmax(pair.a, pair.b);
-  return std::uint64_t{low} << 32 | high;
-}
+std::uint64_t key_of(const BodyPair& pair) { return BodyView::key_of(pair.a, pair.b); }
 
 }  // namespace
 
