@@ -30,6 +30,22 @@ struct BackendStatus {
 /// another thread. Thread-safe.
 JFPX_API std::vector<BackendStatus> available_backends();
 
+/// A GPU of this machine.
+struct Gpu {
+  int number = 0;    ///< for SphereColliderOptions::device
+  std::string name;  ///< with the compute capability and the memory
+  bool usable = false;
+  std::string reason;  ///< why it is unusable; empty if it is usable
+  /// Numbers of the usable GPUs whose memory it can access, and which can access its memory, by a
+  /// link with atomic operations, such as NVLink.
+  std::vector<int> linked;
+};
+
+/// The GPUs of this machine, by number; empty without a driver or in a build without CUDA. As
+/// available_backends(), it does not throw for an unusable GPU. Initializes CUDA on each of them,
+/// which takes some tenths of a second and some hundred MB of its memory. Thread-safe.
+JFPX_API std::vector<Gpu> available_gpus();
+
 /// Returns "auto", "cpu" or "cuda".
 JFPX_API std::string_view to_string(Backend backend) noexcept;
 /// Inverse of to_string(); empty for any other text. Also accepts "x86", the name of

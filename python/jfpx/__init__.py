@@ -8,8 +8,8 @@ of the package derive from jfpx.Error.
 
 from ._character import CharacterHit, CharacterMove, CharacterSettings, CharacterState
 from ._collider import (ContactRows, Contacts, PeriodicContactRows, PeriodicContacts, PeriodicPairs,
-                        PeriodicRows, Rows, SphereCollider, available_backends, find_contacts,
-                        find_pairs)
+                        PeriodicRows, Rows, SphereCollider, available_backends, available_gpus,
+                        find_contacts, find_pairs)
 from ._contact_generators import ContactContext, DetectedContacts
 from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Error, FileError,
                       InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
@@ -37,6 +37,6 @@ __all__ = [
     "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows", "PeriodicContacts", "PeriodicNearest",
     "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording", "RecordingWriter", "Rows", "STAY",
     "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring", "States", "StepReport",
-    "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends", "find_contacts",
-    "find_nearest", "find_neighbors", "find_pairs", "scene_names",
+    "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends", "available_gpus",
+    "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "scene_names",
 ]

@@ -797,3 +797,16 @@ def available_backends() -> list[dict[str, Any]]:
         unusable, otherwise empty.
     """
     return _core.f32.available_backends()
+
+
+def available_gpus() -> list[dict[str, Any]]:
+    """The GPUs of this machine. A GPU that is unusable raises nothing.
+
+    Returns
+    -------
+    list of dict
+        "number", for `device`; "name"; "usable", whether it can be used now; "reason", why it is
+        unusable, otherwise empty; "linked", the numbers of the GPUs with which it can exchange memory
+        by a link with atomic operations, such as NVLink. Empty without a driver.
+    """
+    return _core.f32.available_gpus()

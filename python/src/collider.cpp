@@ -276,6 +276,19 @@ void bind_collider(nb::module_& module) {
     }
     return rows;
   });
+  module.def("available_gpus", [] {
+    nb::list rows;
+    for (const Gpu& gpu : available_gpus()) {
+      nb::dict row;
+      row["number"] = gpu.number;
+      row["name"] = gpu.name;
+      row["usable"] = gpu.usable;
+      row["reason"] = gpu.reason;
+      row["linked"] = gpu.linked;
+      rows.append(row);
+    }
+    return rows;
+  });
 }
 
 }  // namespace python

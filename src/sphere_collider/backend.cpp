@@ -50,6 +50,14 @@ std::vector<BackendStatus> available_backends() {
   return statuses;
 }
 
+std::vector<Gpu> available_gpus() {
+#if JFPX_HAS_CUDA
+  return cuda::probe_all();
+#else
+  return {};
+#endif
+}
+
 std::string_view to_string(Backend backend) noexcept {
   switch (backend) {
     case Backend::automatic:

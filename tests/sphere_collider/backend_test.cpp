@@ -5,6 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
 namespace jfpx {
 namespace {
 
@@ -62,6 +66,24 @@ TEST(Backends, BadOptionsAreNamed) {
     EXPECT_THAT(error.what(), HasSubstr("threads is 257"));
   }
   EXPECT_THROW(make_sphere_collider({.backend = static_cast<Backend>(9)}), InvalidArgument);
+}
+
+TEST(Backends, GpusAreListedWithTheirLinks) {
+  const std::vector<Gpu> gpus = available_gpus();
+  bool is_usable = false;
+  for (const BackendStatus& status : available_backends()) {
+    is_usable = is_usable || (status.backend == Backend::cuda && status.usable);
+  }
+  EXPECT_EQ(!gpus.empty() && gpus[0].usable, is_usable);
+  for (std::size_t i = 0; i < gpus.size(); ++i) {
+    EXPECT_EQ(gpus[i].number, static_cast<int>(i));
+    EXPECT_EQ(gpus[i].usable, gpus[i].reason.empty());
+    for (const int other : gpus[i].linked) {
+      EXPECT_NE(other, gpus[i].number);
+      const std::vector<int>& back = gpus.at(static_cast<std::size_t>(other)).linked;
+      EXPECT_EQ(std::ranges::count(back, gpus[i].number), 1) << i << " and " << other;
+    }
+  }
 }
 
 }  // namespace

@@ -1,11 +1,16 @@
 /// Queries the CUDA runtime for a usable device, and explains why a device cannot be used.
 #include "src/base/cuda/probe.hpp"
 
+#include <jfpx/error.hpp>
+
+#include "src/base/cuda/cuda_try.hpp"
 #include "src/base/cuda/device_code.hpp"
 
 #include <cuda_runtime_api.h>
 
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -73,6 +78,50 @@ BackendStatus probe(int device) {
   }
   status.usable = error == cudaSuccess;
   return status;
+}
+
+std::string why_not_shared(const std::vector<int>& devices) {
+  for (const int from : devices) {
+    for (const int to : devices) {
+      if (from == to) continue;
+      int can = 0, has_atomics = 0;
+      JFPX_CUDA_TRY(cudaDeviceCanAccessPeer(&can, from, to));
+      const std::string pair =
+          "cuda: the GPUs " + std::to_string(from) + " and " + std::to_string(to);
+      if (can == 0) return pair + " cannot access each other's memory";
+      JFPX_CUDA_TRY(
+          cudaDeviceGetP2PAttribute(&has_atomics, cudaDevP2PAttrNativeAtomicSupported, from, to));
+      if (has_atomics == 0) return pair + " have no link with atomic operations, such as NVLink";
+    }
+  }
+  return {};
+}
+
+std::vector<Gpu> probe_all() {
+  int count = 0;
+  if (cudaGetDeviceCount(&count) != cudaSuccess) count = 0;
+  static_cast<void>(cudaGetLastError());
+  std::vector<Gpu> gpus;
+  for (int number = 0; number < count; ++number) {
+    BackendStatus status = probe(number);
+    gpus.push_back({.number = number,
+                    .name = std::move(status.device),
+                    .usable = status.usable,
+                    .reason = std::move(status.reason),
+                    .linked = {}});
+  }
+  for (Gpu& gpu : gpus) {
+    for (const Gpu& other : gpus) {
+      if (other.number == gpu.number || !gpu.usable || !other.usable) continue;
+      try {
+        if (!why_not_shared({gpu.number, other.number}).empty()) continue;
+      } catch (const DeviceError&) {
+        continue;
+      }
+      gpu.linked.push_back(other.number);
+    }
+  }
+  return gpus;
 }
 
 }  // namespace cuda

@@ -6,6 +6,7 @@
 #include <cuda_runtime_api.h>
 
 #include <string>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -14,6 +15,13 @@ namespace cuda {
 /// Status of a device. Does not throw for a missing or unusable device, and leaves no CUDA error
 /// pending.
 BackendStatus probe(int device = 0);
+
+/// See available_gpus().
+std::vector<Gpu> probe_all();
+
+/// @param devices usable ones
+/// @returns why these devices cannot share memory; empty if they can @throws DeviceError
+std::string why_not_shared(const std::vector<int>& devices);
 
 /// Returns the reason why a device cannot be used.
 /// @param error of the first CUDA calls
