@@ -1,4 +1,5 @@
-/// Times of the steps of worlds on a GPU: device_steps SCENE SPHERES STEPS [SCENE SPHERES STEPS]...
+/// Times of the steps of worlds on GPUs:
+/// device_steps [--devices 0,0] SCENE SPHERES STEPS [SCENE SPHERES STEPS]...
 /// Prints the median of the last 100 steps, with all bodies awake, and of 20 calls of states() each
 /// of which follows another step. "shuffled" is `pile` with its
 /// bodies in a random order. The boxes of `mixed` do not count as spheres.
@@ -9,6 +10,7 @@
 #include "bench/world/samples.hpp"
 #include "src/base/stopwatch.hpp"
 #include "src/scenes/scenes.hpp"
+#include "src/world/world_impl.hpp"
 
 #include <algorithm>
 #include <cinttypes>
@@ -32,9 +34,13 @@ jfpx::Scene make_scene(const std::string& name, std::uint32_t spheres) {
   return scene;
 }
 
-void measure(const std::string& name, std::uint32_t spheres, int steps) {
-  jfpx::World world(make_scene(name, spheres),
-                    {.collider = {.backend = jfpx::Backend::cuda}, .threads = 0});
+void measure(const std::vector<int>& devices, const std::string& name, std::uint32_t spheres,
+             int steps) {
+  const jfpx::Scene scene = make_scene(name, spheres);
+  jfpx::World world(scene, {.collider = {.backend = jfpx::Backend::cuda}, .threads = 0});
+  if (!devices.empty()) {
+    jfpx::WorldAccess::impl(world).device = jfpx::make_device_world(scene, devices);
+  }
   std::vector<double> total, detect, resolve, read;
   jfpx::StepReport report;
   for (int n = 0; n < steps; ++n) {
@@ -63,15 +69,26 @@ void measure(const std::string& name, std::uint32_t spheres, int steps) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::vector<int> devices;
+  if (argc > 2 && std::string(argv[1]) == "--devices") {
+    for (char* at = argv[2];; ++at) {
+      devices.push_back(static_cast<int>(std::strtol(at, &at, 10)));
+      if (*at != ',') break;
+    }
+    argc -= 2;
+    argv += 2;
+  }
   if (argc < 4 || argc % 3 != 1) {
-    std::fprintf(stderr, "usage: device_steps SCENE SPHERES STEPS [SCENE SPHERES STEPS]...\n");
+    std::fprintf(
+        stderr,
+        "usage: device_steps [--devices 0,0] SCENE SPHERES STEPS [SCENE SPHERES STEPS]...\n");
     return 2;
   }
   try {
     std::printf(
         "scene            spheres  steps   contacts  step ms   detect    solve  states()   hash\n");
     for (int i = 1; i < argc; i += 3) {
-      measure(argv[i], static_cast<std::uint32_t>(std::strtoul(argv[i + 1], nullptr, 10)),
+      measure(devices, argv[i], static_cast<std::uint32_t>(std::strtoul(argv[i + 1], nullptr, 10)),
               std::atoi(argv[i + 2]));
     }
   } catch (const jfpx::Error& error) {

@@ -1,4 +1,5 @@
-/// Relaxed atomic operations for code that runs on threads of the host and of devices.
+/// Relaxed atomic operations for code that runs on threads of the host and of devices. Those of
+/// devices are atomic with respect to all devices, because several devices may share a step.
 #pragma once
 
 #include <jfpx/config.hpp>
@@ -14,7 +15,7 @@ inline namespace JFPX_ABI {
 /// @returns the value before
 JFPX_HD inline std::uint32_t atomic_add(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
-  return atomicAdd(at, value);
+  return atomicAdd_system(at, value);
 #else
   return std::atomic_ref(*at).fetch_add(value, std::memory_order_relaxed);
 #endif
@@ -22,7 +23,8 @@ JFPX_HD inline std::uint32_t atomic_add(std::uint32_t* at, std::uint32_t value) 
 
 JFPX_HD inline void atomic_add(std::uint64_t* at, std::uint64_t value) {
 #if defined(__CUDA_ARCH__)
-  atomicAdd(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
+  atomicAdd_system(reinterpret_cast<unsigned long long*>(at),
+                   static_cast<unsigned long long>(value));
 #else
   std::atomic_ref(*at).fetch_add(value, std::memory_order_relaxed);
 #endif
@@ -44,7 +46,7 @@ void replace_on_host(T* at, T value, const Precedes& precedes) {
 
 JFPX_HD inline void atomic_min(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
-  atomicMin(at, value);
+  atomicMin_system(at, value);
 #else
   detail::replace_on_host(at, value, std::less<>());
 #endif
@@ -52,7 +54,8 @@ JFPX_HD inline void atomic_min(std::uint32_t* at, std::uint32_t value) {
 
 JFPX_HD inline void atomic_min(std::uint64_t* at, std::uint64_t value) {
 #if defined(__CUDA_ARCH__)
-  atomicMin(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
+  atomicMin_system(reinterpret_cast<unsigned long long*>(at),
+                   static_cast<unsigned long long>(value));
 #else
   detail::replace_on_host(at, value, std::less<>());
 #endif
@@ -60,7 +63,7 @@ JFPX_HD inline void atomic_min(std::uint64_t* at, std::uint64_t value) {
 
 JFPX_HD inline void atomic_max(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
-  atomicMax(at, value);
+  atomicMax_system(at, value);
 #else
   detail::replace_on_host(at, value, std::greater<>());
 #endif
@@ -68,7 +71,8 @@ JFPX_HD inline void atomic_max(std::uint32_t* at, std::uint32_t value) {
 
 JFPX_HD inline void atomic_max(std::uint64_t* at, std::uint64_t value) {
 #if defined(__CUDA_ARCH__)
-  atomicMax(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(value));
+  atomicMax_system(reinterpret_cast<unsigned long long*>(at),
+                   static_cast<unsigned long long>(value));
 #else
   detail::replace_on_host(at, value, std::greater<>());
 #endif
@@ -76,7 +80,7 @@ JFPX_HD inline void atomic_max(std::uint64_t* at, std::uint64_t value) {
 
 JFPX_HD inline void atomic_or(std::uint64_t* at, std::uint64_t bits) {
 #if defined(__CUDA_ARCH__)
-  atomicOr(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(bits));
+  atomicOr_system(reinterpret_cast<unsigned long long*>(at), static_cast<unsigned long long>(bits));
 #else
   std::atomic_ref(*at).fetch_or(bits, std::memory_order_relaxed);
 #endif
@@ -85,7 +89,7 @@ JFPX_HD inline void atomic_or(std::uint64_t* at, std::uint64_t bits) {
 /// @returns the value before
 JFPX_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)
-  return atomicExch(at, value);
+  return atomicExch_system(at, value);
 #else
   return std::atomic_ref(*at).exchange(value, std::memory_order_relaxed);
 #endif
@@ -95,7 +99,7 @@ JFPX_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t va
 JFPX_HD inline std::uint32_t atomic_exchange_if(std::uint32_t* at, std::uint32_t expected,
                                                 std::uint32_t desired) {
 #if defined(__CUDA_ARCH__)
-  return atomicCAS(at, expected, desired);
+  return atomicCAS_system(at, expected, desired);
 #else
   std::atomic_ref(*at).compare_exchange_strong(expected, desired, std::memory_order_relaxed);
   return expected;

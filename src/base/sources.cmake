@@ -16,6 +16,7 @@ list(APPEND JFPX_SOURCES
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/cuda_try.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/device_buffer.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/mapped_memory.cpp
   ${CMAKE_CURRENT_LIST_DIR}/cuda/device_code.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/probe.cpp)
 # windows.h defines macros that are names in other sources.

@@ -363,12 +363,12 @@ World::World(const Scene& scene, const WorldSettings& settings) {
                      settings.collider.simd, settings.communicator);
   impl_->hit_speed = settings.hit_speed;
   if (options.backend == Backend::cuda && scene.solver == Solver::soft_step) {
-    impl_->device = make_device_world(scene, settings.collider.device);
+    impl_->device = make_device_world(scene, {settings.collider.device});
   }
   if (options.backend == Backend::automatic && backend_row(Backend::cuda).compiled) {
     impl_->automatic = std::make_unique<AutomaticDevice>(
         settings.collider.costs, [number = settings.collider.device] {
-          return Impl::warmed(make_device_world(Scene{}, number));
+          return Impl::warmed(make_device_world(Scene{}, {number}));
         });
   }
 }

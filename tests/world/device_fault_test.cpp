@@ -1,5 +1,4 @@
 /// Steps on a CUDA device while CUDA calls fail.
-#include <jfpx/backend.hpp>
 #include <jfpx/cuda/world.hpp>
 #include <jfpx/error.hpp>
 #include <jfpx/force.hpp>
@@ -7,21 +6,32 @@
 #include "src/base/cuda/cuda_try.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
+#include "tests/world/cuda_devices.hpp"
+#include "tests/world/several_blocks.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <cstdlib>
+#include <vector>
 
 namespace jfpx {
 namespace {
 
-bool has_device() {
-  for (const BackendStatus& status : available_backends()) {
-    if (status.backend == Backend::cuda && status.usable) return true;
-  }
-  return false;
-}
+/// On one device, and on several parts of it.
+class CudaWorld : public testing::TestWithParam<test::CudaDevices> {
+ private:
+  test::SeveralBlocks several_blocks_{
+      GetParam().devices.size() > 1 ? 8 : soft_step::kMostBodiesInOneBlock};
+};
+INSTANTIATE_TEST_SUITE_P(Devices, CudaWorld, testing::ValuesIn([] {
+                           std::vector<test::CudaDevices> all = test::one_cuda_device();
+                           for (const auto& devices : test::several_cuda_devices()) {
+                             all.push_back(devices);
+                           }
+                           return all;
+                         }()),
+                         [](const auto& row) { return row.param.name; });
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(CudaWorld);  // no CUDA device
 
 void add_forces(World* world) {
   world->add_force(Gravity{});
@@ -40,11 +50,7 @@ void retry(const Change& change) {
 }
 
 /// If a call of a step fails, the processor completes this step and the later ones.
-TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
-  if (!has_device()) {
-    ASSERT_EQ(std::getenv("JFPX_REQUIRE_CUDA"), nullptr);
-    GTEST_SKIP() << "no CUDA device";
-  }
+TEST_P(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
   constexpr int kSteps = 4;
   const Scene scene = scenes::make("mixed", {.spheres = 40});
   const auto run = [&scene](World* world) {
@@ -66,7 +72,7 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
     ASSERT_LT(failing, 2000);
     World world(scene, {.collider = {.backend = Backend::cpu}});
     add_forces(&world);
-    WorldAccess::impl(world).device = make_device_world(scene);
+    WorldAccess::impl(world).device = GetParam()(scene);
     cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);
     run(&world);
     for (long n = 0; n <= failing; ++n) {
@@ -80,11 +86,7 @@ TEST(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
 
 /// The same for enqueued steps: whichever call fails, of the queue, of the wait for it, or of the
 /// changes in between, the processor makes the steps that the device has not completed.
-TEST(CudaWorld, AnyFailingCallOfAQueueLeavesTheBitsOfTheProcessor) {
-  if (!has_device()) {
-    ASSERT_EQ(std::getenv("JFPX_REQUIRE_CUDA"), nullptr);
-    GTEST_SKIP() << "no CUDA device";
-  }
+TEST_P(CudaWorld, AnyFailingCallOfAQueueLeavesTheBitsOfTheProcessor) {
   const Scene scene = scenes::make("mixed", {.spheres = 40});
   const auto run = [](World* world, bool is_queue) {
     for (std::uint32_t n = 1; n < 4; ++n) {
@@ -110,7 +112,7 @@ TEST(CudaWorld, AnyFailingCallOfAQueueLeavesTheBitsOfTheProcessor) {
     ASSERT_LT(failing, 2000);
     World world(scene, {.collider = {.backend = Backend::cpu}});
     add_forces(&world);
-    WorldAccess::impl(world).device = make_device_world(scene);
+    WorldAccess::impl(world).device = GetParam()(scene);
     cuda::inject_fault(failing, cudaErrorLaunchOutOfResources);
     run(&world, true);
     const StepReport report = cuda::finish_steps(world);

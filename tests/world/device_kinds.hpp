@@ -1,9 +1,8 @@
 /// The devices for tests of queues: the host, and a GPU if there is one.
 #pragma once
 
-#include <jfpx/backend.hpp>
-
 #include "src/world/world_impl.hpp"
+#include "tests/world/cuda_devices.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/several_blocks.hpp"
 
@@ -12,7 +11,6 @@
 #include <cuda_runtime_api.h>
 #endif
 
-#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -37,7 +35,7 @@ struct DeviceKind {
   std::uint32_t most_in_one_block = soft_step::kMostBodiesInOneBlock;
   std::function<std::unique_ptr<DeviceWorld>(const Scene&)> make;
   /// Captures the work that `work` enqueues on a stream. @returns a function that launches the
-  /// graph on the default stream
+  /// graph on the default stream. Null: steps cannot be captured.
   std::function<std::function<void()>(World*, const std::function<void(cuda::Stream)>& work)>
       capture;
 };
@@ -97,15 +95,9 @@ inline std::vector<DeviceKind> device_kinds() {
   std::vector<DeviceKind> kinds{
       {.name = "Host", .make = make_host_device_world, .capture = capture_on_host}};
 #if JFPX_HAS_CUDA
-  bool has_device = std::getenv("JFPX_REQUIRE_CUDA") != nullptr;
-  for (const BackendStatus& status : available_backends()) {
-    has_device = has_device || (status.backend == Backend::cuda && status.usable);
-  }
-  if (has_device) {
-    kinds.push_back({.name = "Cuda",
-                     .is_cuda = true,
-                     .make = [](const Scene& scene) { return make_device_world(scene); },
-                     .capture = capture_on_cuda});
+  for (const CudaDevices& devices : one_cuda_device()) {
+    kinds.push_back(
+        {.name = devices.name, .is_cuda = true, .make = devices, .capture = capture_on_cuda});
   }
 #endif
   for (std::size_t i = kinds.size(); i-- > 0;) {
@@ -113,6 +105,15 @@ inline std::vector<DeviceKind> device_kinds() {
     kinds.back().name += "WithBlocks";
     kinds.back().most_in_one_block = 8;
   }
+#if JFPX_HAS_CUDA
+  for (const CudaDevices& devices : several_cuda_devices()) {
+    kinds.push_back({.name = devices.name,
+                     .is_cuda = true,
+                     .most_in_one_block = 8,
+                     .make = devices,
+                     .capture = nullptr});
+  }
+#endif
   return kinds;
 }
 

@@ -39,16 +39,26 @@ class DeviceQueueTest : public testing::TestWithParam<test::DeviceKind> {
   static World on_host(const Scene& scene) {
     return World(scene, {.collider = {.backend = Backend::cpu}, .hit_speed = 0.5_r});
   }
-  /// A graph of steps, which the returned function launches.
-  std::function<void()> graph_of(World* world, std::uint32_t steps) const {
-    return GetParam().capture(
-        world, [&](cuda::Stream stream) { cuda::enqueue_steps(*world, steps, stream); });
-  }
 
  private:
   test::SeveralBlocks several_blocks_{GetParam().most_in_one_block};
 };
 INSTANTIATE_TEST_SUITE_P(Devices, DeviceQueueTest, testing::ValuesIn(test::device_kinds()),
+                         [](const auto& row) { return row.param.name; });
+
+class DeviceGraphTest : public DeviceQueueTest {
+ protected:
+  /// A graph of steps, which the returned function launches.
+  std::function<void()> graph_of(World* world, std::uint32_t steps) const {
+    return GetParam().capture(
+        world, [&](cuda::Stream stream) { cuda::enqueue_steps(*world, steps, stream); });
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Devices, DeviceGraphTest, testing::ValuesIn([] {
+                           std::vector<test::DeviceKind> kinds = test::device_kinds();
+                           std::erase_if(kinds, [](const auto& kind) { return !kind.capture; });
+                           return kinds;
+                         }()),
                          [](const auto& row) { return row.param.name; });
 
 /// Queues between single steps, changes of all kinds, looks at everything, and snapshots.
@@ -101,7 +111,7 @@ TEST_P(DeviceQueueTest, EnqueuedStepsHaveTheBitsOfTheProcessor) {
 }
 
 /// Graphs of one to three steps, between queues, single steps and changes.
-TEST_P(DeviceQueueTest, ReplayedStepsHaveTheBitsOfTheProcessor) {
+TEST_P(DeviceGraphTest, ReplayedStepsHaveTheBitsOfTheProcessor) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
@@ -156,7 +166,7 @@ TEST_P(DeviceQueueTest, ReplayedStepsHaveTheBitsOfTheProcessor) {
   EXPECT_GT(replayed, 50u);
 }
 
-TEST_P(DeviceQueueTest, AGraphOfTwoStepsMovesAPile) {
+TEST_P(DeviceGraphTest, AGraphOfTwoStepsMovesAPile) {
   const Scene scene = scenes::make("pile", {.spheres = 200});
   World host = on_host(scene), device = on_device(scene);
   make_steps(&host, 400), make_steps(&device, 400);  // then the lists of contacts are long enough
@@ -170,7 +180,7 @@ TEST_P(DeviceQueueTest, AGraphOfTwoStepsMovesAPile) {
 }
 
 /// Balls that meet all at once need room for contacts in the middle of a queue, or of replays.
-TEST_P(DeviceQueueTest, AStepWithoutRoomIsRepeatedBeforeItCanBeSeen) {
+TEST_P(DeviceGraphTest, AStepWithoutRoomIsRepeatedBeforeItCanBeSeen) {
   Scene scene;
   for (int i = 0; i < 400; ++i) {
     const Vec3 place{static_cast<Real>(i % 20), static_cast<Real>(i / 20), 0};
@@ -205,7 +215,7 @@ TEST_P(DeviceQueueTest, AStepWithoutRoomIsRepeatedBeforeItCanBeSeen) {
 
 /// Each step after the one in which a body runs away is undone, as step() would undo it. What the
 /// first of them has changed of the other body before it failed is restored.
-TEST_P(DeviceQueueTest, ARunawayBodyUndoesTheRestOfTheQueue) {
+TEST_P(DeviceGraphTest, ARunawayBodyUndoesTheRestOfTheQueue) {
   Scene scene;
   scene.bodies = {test::ball({0, 0, 0}), test::ball({kMaxCoordinate * 0.9_r, 0, 0})};
   scene.bodies[0].can_sleep = false;
@@ -282,7 +292,7 @@ TEST_P(DeviceQueueTest, ForcesThatWakeABodyAreLeftToTheHost) {
 }
 
 /// A replay after a change of the host must see it, though the graph has no part of it.
-TEST_P(DeviceQueueTest, ReplaysSeeTheChangesBeforeThem) {
+TEST_P(DeviceGraphTest, ReplaysSeeTheChangesBeforeThem) {
   const Scene scene = scenes::make("pile", {.spheres = 30});
   World host = on_host(scene), device = on_device(scene);
   std::vector<ForceId> ids;
@@ -346,7 +356,24 @@ TEST_P(DeviceQueueTest, TheVersionChangesWhenAGraphIsNoLongerValid) {
   EXPECT_TRUE(changes());
 }
 
-TEST_P(DeviceQueueTest, ACaptureNeedsAWorldThatIsOnTheDevice) {
+#if JFPX_HAS_CUDA
+TEST(DeviceGraph, OfAWorldOnSeveralDevicesIsRefused) {
+  const test::SeveralBlocks several_blocks(8);
+  const Scene scene = scenes::make("pile", {.spheres = 20});
+  for (const test::CudaDevices& devices : test::several_cuda_devices()) {
+    World world(scene, {.collider = {.backend = Backend::cpu}});
+    WorldAccess::impl(world).device = devices(scene);
+    world.step();
+    cuda::device_states(world);
+    EXPECT_THROW(test::capture_on_cuda(
+                     &world, [&](cuda::Stream stream) { cuda::enqueue_steps(world, 1, stream); }),
+                 InvalidArgument);
+    world.step();
+  }
+}
+#endif
+
+TEST_P(DeviceGraphTest, ACaptureNeedsAWorldThatIsOnTheDevice) {
   const Scene scene = scenes::make("pile", {.spheres = 20});
   World world = on_device(scene);
   EXPECT_THROW(graph_of(&world, 1), InvalidArgument) << "not uploaded";
@@ -377,7 +404,7 @@ TEST_P(DeviceQueueTest, ACaptureNeedsAWorldThatIsOnTheDevice) {
 }
 
 /// A world that sleeps launches nothing, except in a graph.
-TEST_P(DeviceQueueTest, ASleepingWorldIsLeftAlone) {
+TEST_P(DeviceGraphTest, ASleepingWorldIsLeftAlone) {
   Scene scene;
   scene.bodies = {test::ground(), test::heavy({0, 1, 0})};
   World host = on_host(scene), device = on_device(scene);
@@ -454,7 +481,7 @@ TEST_P(DeviceQueueTest, StatesAreUpdatedInTheOrderOfTheStream) {
   }
 }
 
-TEST_P(DeviceQueueTest, ConcurrentReadersFinishAQueueOnce) {
+TEST_P(DeviceGraphTest, ConcurrentReadersFinishAQueueOnce) {
   const Scene scene = scenes::make("pile", {.spheres = 60});
   World host = on_host(scene), device = on_device(scene);
   make_steps(&host, 300), make_steps(&device, 300);

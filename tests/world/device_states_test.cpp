@@ -5,6 +5,7 @@
 
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
+#include "tests/world/cuda_devices.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
 
@@ -31,19 +32,11 @@ struct Kind {
   std::function<void(void* to, const void* from, std::size_t bytes)> copy;
 };
 
-bool has_device() {
-  for (const BackendStatus& status : available_backends()) {
-    if (status.backend == Backend::cuda && status.usable) return true;
-  }
-  return false;
-}
-
 std::vector<Kind> kinds() {
   std::vector<Kind> kinds{{"Host", test::make_host_device_world, std::memcpy}};
 #if JFPX_HAS_CUDA
-  if (has_device() || std::getenv("JFPX_REQUIRE_CUDA") != nullptr) {
-    kinds.push_back({"Cuda", [](const Scene& scene) { return make_device_world(scene); },
-                     [](void* to, const void* from, std::size_t bytes) {
+  for (const auto& devices : test::one_cuda_device()) {
+    kinds.push_back({devices.name, devices, [](void* to, const void* from, std::size_t bytes) {
                        ASSERT_EQ(cudaMemcpy(to, from, bytes, cudaMemcpyDefault), cudaSuccess);
                      }});
   }
@@ -138,10 +131,7 @@ TEST(DeviceStates, RequireADevice) {
 
 /// The contact finder of a world with the thesis' solver uses the GPU; its state does not.
 TEST(DeviceStates, RequireSoftStep) {
-  if (!has_device()) {
-    ASSERT_EQ(std::getenv("JFPX_REQUIRE_CUDA"), nullptr);
-    GTEST_SKIP() << "no CUDA device";
-  }
+  if (test::one_cuda_device().empty()) GTEST_SKIP() << "no CUDA device";
   Scene scene = scenes::make("pile", {.spheres = 5});
   scene.solver = Solver::worst_first;
   World world(scene, {.collider = {.backend = Backend::cuda}});

@@ -1,6 +1,5 @@
 /// Worlds that are stepped on a device have the bits of those of the processor. Without a GPU, the
 /// programs of the device run on the host; with one, on the GPU too.
-#include <jfpx/backend.hpp>
 #include <jfpx/force.hpp>
 #include <jfpx/recorded_world.hpp>
 
@@ -8,6 +7,7 @@
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
 #include "tests/world/chambers.hpp"
+#include "tests/world/cuda_devices.hpp"
 #include "tests/world/equal_worlds.hpp"
 #include "tests/world/host_device.hpp"
 #include "tests/world/random_bodies.hpp"
@@ -52,6 +52,9 @@ class DeviceWorldTest : public testing::TestWithParam<Kind> {
   static World on_host(const Scene& scene) {
     return World(scene, {.collider = {.backend = Backend::cpu}, .hit_speed = 0.5_r});
   }
+  void compare_random_scenes(int scenes) const;
+  void compare_named_scenes(int steps) const;
+  void compare_heap(int steps) const;
 
  private:
   test::SeveralBlocks several_blocks_{GetParam().most_in_one_block};
@@ -59,18 +62,28 @@ class DeviceWorldTest : public testing::TestWithParam<Kind> {
 
 std::vector<Kind> kinds() {
   std::vector<Kind> kinds{{"Host", test::make_host_device_world}};
-  for (const BackendStatus& status : available_backends()) {
-    if (status.backend == Backend::cuda && status.usable) {
-      kinds.push_back({"Cuda", [](const Scene& scene) { return make_device_world(scene); }});
-    }
-  }
+  for (const auto& devices : test::one_cuda_device()) kinds.push_back({devices.name, devices});
   for (std::size_t i = kinds.size(); i-- > 0;) {
     kinds.push_back({kinds[i].name + "WithBlocks", kinds[i].make, 8});
+  }
+  for (const auto& devices : test::several_cuda_devices()) {
+    kinds.push_back({devices.name, devices, 8});
   }
   return kinds;
 }
 INSTANTIATE_TEST_SUITE_P(Devices, DeviceWorldTest, testing::ValuesIn(kinds()),
                          [](const auto& row) { return row.param.name; });
+
+/// Two parts on the host, as threads. Their barriers take long on a busy machine, so there are only
+/// some tests, in float.
+class HostPartsTest : public DeviceWorldTest {};
+#if !defined(JFPX_DOUBLE_PRECISION)
+INSTANTIATE_TEST_SUITE_P(Devices, HostPartsTest,
+                         testing::Values(Kind{"HostTwoParts", test::make_two_part_world, 8}),
+                         [](const auto& row) { return row.param.name; });
+#else
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(HostPartsTest);
+#endif
 
 /// A scene of bodies of all kinds in a small room.
 Scene random_scene(Random* random) {
@@ -122,11 +135,11 @@ void step_both(World* host, World* device, std::uint64_t* contacts = nullptr) {
   if (contacts != nullptr) *contacts += a.contacts;
 }
 
-TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
+void DeviceWorldTest::compare_random_scenes(int scenes) const {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));
   Random random(seed);
-  for (int k = 0; k < 25; ++k) {
+  for (int k = 0; k < scenes; ++k) {
     const Scene scene = random_scene(&random);
     World host = on_host(scene), device = on_device(scene);
     for (int n = 0; n < scene_steps(40); ++n) {
@@ -140,6 +153,8 @@ TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) {
     EXPECT_TRUE(WorldAccess::impl(device).resident());
   }
 }
+TEST_P(DeviceWorldTest, RandomScenesHaveTheBitsOfTheProcessor) { compare_random_scenes(25); }
+TEST_P(HostPartsTest, RandomScenesHaveTheBitsOfTheProcessor) { compare_random_scenes(4); }
 
 /// Heightfields of several tiles, one of which moves, with slow and fast bodies.
 TEST_P(DeviceWorldTest, BodiesOnHeightfieldsHaveTheBitsOfTheProcessor) {
@@ -272,7 +287,7 @@ TEST_P(DeviceWorldTest, FastBodiesInRoomsHaveTheBitsOfTheProcessor) {
   }
 }
 
-TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
+void DeviceWorldTest::compare_named_scenes(int steps) const {
   for (const char* name : {"pile", "mixed", "polydisperse", "columns", "overlap", "tower",
                            "capsules", "terrain", "bridge"}) {
     scenes::Options options;
@@ -280,13 +295,15 @@ TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) {
     const Scene scene = scenes::make(name, options);
     if (scene.solver != Solver::soft_step) continue;
     World host = on_host(scene), device = on_device(scene);
-    for (int n = 0; n < 150; ++n) {
+    for (int n = 0; n < steps; ++n) {
       host.step();
       device.step();
     }
     EXPECT_EQ(host.state_hash(), device.state_hash()) << name;
   }
 }
+TEST_P(DeviceWorldTest, NamedScenesHaveTheBitsOfTheProcessor) { compare_named_scenes(150); }
+TEST_P(HostPartsTest, NamedScenesHaveTheBitsOfTheProcessor) { compare_named_scenes(25); }
 
 /// A step whose lists are too short is repeated, and allocates memory.
 TEST_P(DeviceWorldTest, FewStepsOfAFallingHeapAreRepeated) {
@@ -581,6 +598,22 @@ TEST_P(DeviceWorldTest, SeveralBlocksOfBodiesHaveTheBitsOfTheProcessor) {
   ASSERT_NO_FATAL_FAILURE(step(3));
   EXPECT_TRUE(host.snapshot() == device.snapshot());
 }
+
+/// A falling heap whose partition into blocks is renewed, with boxes, which have rows of manifolds.
+void DeviceWorldTest::compare_heap(int steps) const {
+  Scene scene = scenes::make("heap", {.spheres = 6000});
+  for (std::size_t i = 0; i < 6000; i += 7) scene.bodies[i].shape = Box{{0.4_r, 0.4_r, 0.4_r}};
+  World host = on_host(scene), device = on_device(scene);
+  for (int n = 0; n < steps; ++n) {
+    host.step(), device.step();
+    if (n % 5 == 0) {
+      ASSERT_EQ(host.state_hash(), device.state_hash()) << "step " << n;
+    }
+  }
+  EXPECT_TRUE(host.snapshot() == device.snapshot());
+}
+TEST_P(DeviceWorldTest, AHeapOfManyBlocksHasTheBitsOfTheProcessor) { compare_heap(70); }
+TEST_P(HostPartsTest, AHeapOfManyBlocksHasTheBitsOfTheProcessor) { compare_heap(30); }
 
 /// A body in the slot of a removed one does not take over its impulses or its neighbors.
 TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {

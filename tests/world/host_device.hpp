@@ -1,18 +1,23 @@
 /// A device on the host, for machines without a GPU: runs the programs of a device step in one
-/// thread.
+/// thread, or in one thread for each part.
 #pragma once
 
 #include <jfpx/sphere_collider.hpp>
 
+#include "src/base/atomic.hpp"
 #include "src/world/device/device_step.hpp"
 
 #include <algorithm>
+#include <barrier>
+#include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <functional>
 #include <memory>
 #include <stdexcept>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -21,11 +26,32 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
 
-/// Runs the items of a loop in an order that differs between loops, as on a device.
+/// Runs the items of a loop in an order that differs between loops, as on a device. Each part of a
+/// team is a thread.
 class HostTeam {
  public:
-  void sync() const {}
-  const std::uint32_t* cached_bins(const std::uint32_t* numbers) const { return numbers; }
+  /// What the parts of a team share.
+  struct Shared {
+    explicit Shared(std::uint32_t parts)
+        : barrier(static_cast<std::ptrdiff_t>(parts)), sums(parts) {}
+    std::barrier<> barrier;
+    std::vector<std::uint64_t> sums;  ///< by part, of a scan
+  };
+
+  /// @param seed differs between teams, and selects the order of items
+  HostTeam(Shared* shared, std::uint32_t part, std::uint32_t parts, std::uint64_t seed)
+      : shared_(shared), part_(part), parts_(parts), loops_(seed) {}
+
+  void sync() const {
+    if (shared_ != nullptr) shared_->barrier.arrive_and_wait();
+  }
+  const device::RowBins& cached_bins(const device::RowBins* bins) const { return bins[part_]; }
+  std::uint32_t part() const { return part_; }
+  HostTeam team_of_part() const {
+    HostTeam team(shared_, 0, 1, ++loops_);
+    team.has_barriers_of_others_ = parts_ > 1;
+    return team;
+  }
 
   struct alignas(64) SharedPiece {
     SharedPiece() { std::ranges::fill(numbers, std::nan("")); }  // like uninitialized memory
@@ -33,11 +59,12 @@ class HostTeam {
   };
   /// Calls f(block, threads) for all blocks < n.
   template <class F>
-  void for_blocks(std::uint32_t n, const F& f) const {
-    for_each_nowait(n, [&](std::uint32_t block) {
+  void for_blocks(std::uint32_t n, const F& f, std::uint32_t each) const {
+    const auto run = [&](std::uint32_t block) {
       memory_.clear();
       f(block, Threads{*this, &memory_});
-    });
+    };
+    for_each_nowait(n, run, each);
   }
   /// The threads of a block.
   struct Threads {
@@ -51,7 +78,7 @@ class HostTeam {
     }
     template <class F>
     void for_each(std::uint32_t n, const F& f) const {
-      team.for_each_nowait(n, f);
+      team.visit({0, n}, f);
     }
     template <class F>
     void once(const F& f) const {
@@ -64,38 +91,39 @@ class HostTeam {
     }
   };
   void sort(std::uint32_t n, const device::SortedCodes& codes) const {
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted(n);
-    for (std::uint32_t i = 0; i < n; ++i) sorted[i] = {codes.keys[i], codes.items[i]};
-    std::ranges::stable_sort(sorted, {}, [](const auto& item) { return item.first; });
-    for (std::uint32_t i = 0; i < n; ++i) {
-      std::tie(codes.keys[i], codes.items[i]) = sorted[i];
-      codes.other_keys[i] = 0, codes.other_items[i] = device::kNone;
-    }
+    once([&] {
+      std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted(n);
+      for (std::uint32_t i = 0; i < n; ++i) sorted[i] = {codes.keys[i], codes.items[i]};
+      std::ranges::stable_sort(sorted, {}, [](const auto& item) { return item.first; });
+      for (std::uint32_t i = 0; i < n; ++i) {
+        std::tie(codes.keys[i], codes.items[i]) = sorted[i];
+        codes.other_keys[i] = 0, codes.other_items[i] = device::kNone;
+      }
+    });
+    sync();
   }
 
   template <class F>
-  void for_each_nowait(std::uint32_t n, const F& f) const {
-    if (n == 0) return;
-    const std::uint32_t start = static_cast<std::uint32_t>(++loops_ * 2654435761u % n);
-    for (std::uint32_t i = start; i < n; ++i) f(i);
-    for (std::uint32_t i = start; i-- > 0;) f(i);
+  void for_each_nowait(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
+    visit(device::range_of_part(n, part_, parts_, each), f);
   }
   template <class F>
-  void for_each(std::uint32_t n, const F& f) const {
-    for_each_nowait(n, f);
+  void for_each(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
+    for_each_nowait(n, f, each);
+    sync();
   }
   /// With one thread.
   template <class F>
   void for_each_thread(const F& f) const {
-    f(0u, 1u, [] {});
+    f(0u, 1u, [&] { sync(); });
   }
   template <class F>
   void once(const F& f) const {
-    f();
+    if (part_ == 0) f();
   }
   template <class F>
   void in_one_block(const F& f) const {
-    f(*this);
+    once([&] { f(HostTeam(nullptr, 0, 1, ++loops_)); });
   }
   /// Completes the items in a different order than that of their dependencies.
   template <class Dataflow>
@@ -115,75 +143,140 @@ class HostTeam {
     }
   }
   template <class Condition>
-  void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum) const {
-    for (std::uint32_t i = 0; i < n; ++i) *sum += condition(i) ? 1 : 0;
+  void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum,
+             std::uint32_t each = 0) const {
+    std::uint32_t mine = 0;
+    const auto add = [&](std::uint32_t i) { mine += condition(i) ? 1 : 0; };
+    for_each_nowait(n, add, each);
+    if (mine > 0) atomic_add(sum, mine);
   }
   template <class Measure, class Size, class Place>
-  auto scan(std::uint32_t n, const Measure& measure, const Size& size, const Place& place) const {
-    std::vector<decltype(size(0))> before(n);
-    decltype(size(0)) sum = 0;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      before[i] = sum;
-      sum += measure(i);
+  auto scan(std::uint32_t n, const Measure& measure, const Size& size, const Place& place,
+            std::uint32_t each = 0) const {
+    using Number = decltype(size(0));
+    const device::Range mine = device::range_of_part(n, part_, parts_, each);
+    std::vector<Number> before(mine.end - mine.begin + 1);
+    for (std::uint32_t i = mine.begin; i < mine.end; ++i) {
+      before[i - mine.begin + 1] = before[i - mine.begin] + measure(i);
     }
-    for (std::uint32_t i = n; i-- > 0;) {
-      if (size(i) != (i + 1 < n ? before[i + 1] : sum) - before[i]) {
+    Number first = 0, total = before.back();
+    if (!has_barriers_of_others_) shared_->sums[part_] = total;
+    sync();
+    if (!has_barriers_of_others_) {
+      total = 0;
+      for (std::uint32_t part = 0; part < parts_; ++part) {
+        if (part == part_) first = total;
+        total += static_cast<Number>(shared_->sums[part]);
+      }
+    }
+    for (std::uint32_t i = mine.end; i-- > mine.begin;) {
+      const std::uint32_t k = i - mine.begin;
+      if (size(i) != before[k + 1] - before[k]) {
         throw std::logic_error("a scan with two different sizes of an item");
       }
-      place(i, before[i]);
+      place(i, first + before[k]);
     }
-    return sum;
+    sync();
+    return total;
   }
-  template <class BinOf, class Place>
-  void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* begin, const BinOf& bin_of,
-                 const Place& place) const {
-    std::vector<std::uint32_t> next(device::kBins + 1);
-    for (std::uint32_t i = 0; i < n; ++i) {
-      bins[i] = bin_of(i);
-      if (bins[i] < device::kBins) ++next[bins[i] + 1u];
+  template <class BinOf, class PartOf, class Place>
+  void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* sizes, device::RowBins* begin,
+                 std::uint32_t capacity, const BinOf& bin_of, const PartOf& part_of,
+                 const Place& place, std::uint32_t each) const {
+    constexpr std::uint32_t kStride = device::kBins + 1;
+    const device::Range mine = device::range_of_part(n, part_, parts_, each);
+    std::vector<std::uint32_t> next(parts_ * kStride);
+    for (std::uint32_t i = mine.begin; i < mine.end; ++i) {
+      std::uint32_t bin = bin_of(i);
+      if (bin < device::kBins) {
+        if (parts_ > 1) bin += part_of(i, static_cast<std::uint16_t>(bin)) * kStride;
+        ++next[bin];
+      }
+      bins[i] = static_cast<std::uint16_t>(bin);
     }
-    for (std::uint32_t b = 0; b < device::kBins; ++b) next[b + 1] += next[b];
-    std::ranges::copy(next, begin);
-    for (std::uint32_t i = n; i-- > 0;) {
-      if (bins[i] < device::kBins) place(i, next[bins[i]]++, bins[i]);
+    for (std::uint32_t b = 0; b < parts_ * kStride; ++b) {
+      if (next[b] > 0) next[b] = atomic_add(&sizes[b], next[b]);
     }
+    sync();
+    for (std::uint32_t part = 0; part < parts_; ++part) {
+      std::uint32_t first = part * capacity;
+      for (std::uint32_t b = 0; b < kStride; ++b) {
+        next[part * kStride + b] += first;
+        if (part_ == 0) begin[part].begin[b] = first;
+        first += sizes[part * kStride + b];
+      }
+    }
+    for (std::uint32_t i = mine.end; i-- > mine.begin;) {
+      const std::uint32_t bin = bins[i];
+      if (bin != soft_step::kNoBin) {
+        place(i, next[bin]++, static_cast<std::uint16_t>(bin % kStride));
+      }
+    }
+    sync();
   }
 
  private:
-  mutable std::uint64_t loops_ = 0;
+  template <class F>
+  void visit(const device::Range& range, const F& f) const {
+    const std::uint32_t n = range.end - range.begin;
+    if (n == 0) return;
+    const std::uint32_t start =
+        range.begin + static_cast<std::uint32_t>(++loops_ * 2654435761u % n);
+    for (std::uint32_t i = start; i < range.end; ++i) f(i);
+    for (std::uint32_t i = start; i-- > range.begin;) f(i);
+  }
+
+  Shared* shared_;  ///< null: without other parts and without a barrier
+  std::uint32_t part_, parts_;
+  bool has_barriers_of_others_ = false;  ///< whether it is a team of one of several parts
+  mutable std::uint64_t loops_;
   mutable std::vector<SharedPiece> memory_;  ///< shared by the threads of a block
 };
 
 class HostDevice {
  public:
+  explicit HostDevice(std::uint32_t parts = 1) : parts_(parts), shared_(1), shared_by_all_(parts) {}
+
   template <class T>
   class Buffer {
    public:
     T* data() const { return const_cast<T*>(items_.data()); }
     std::size_t capacity() const { return items_.size(); }
-    void reserve(std::size_t count) {
-      // Poisoned, because device memory is not initialized.
-      if (count <= items_.size()) return;
+    /// Poisoned, because device memory is not initialized.
+    void replace(std::size_t count, double used) {
+      used_ = used;
       items_.assign(count, T{});
       std::fill_n(reinterpret_cast<unsigned char*>(items_.data()), count * sizeof(T),
                   static_cast<unsigned char>(0xcd));
     }
-    void swap(Buffer& other) noexcept { items_.swap(other.items_); }
+    double used() const { return used_; }  ///< PageLayout::used
+    void swap(Buffer& other) noexcept {
+      items_.swap(other.items_);
+      std::swap(used_, other.used_);
+    }
 
    private:
     std::vector<T> items_;
+    double used_ = 1;
   };
 
   int number() const { return 0; }
+  std::uint32_t parts() const { return parts_; }
+  void use_parts(std::uint32_t) {}
   cuda::Stream stream() const { return nullptr; }
 
   template <class T>
-  void reserve(Buffer<T>* buffer, std::size_t count, const char*) {
-    buffer->reserve(count);
+  void reserve(Buffer<T>* buffer, std::size_t count, const char*, const PageLayout& layout) {
+    if (count > buffer->capacity()) buffer->replace(count, layout.used);
   }
   template <class T>
-  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char*) {
-    buffer->reserve(count);
+  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char*,
+                       const PageLayout& layout) {
+    if (!fits(*buffer, count, layout)) buffer->replace(count, layout.used);
+  }
+  template <class T>
+  bool fits(const Buffer<T>& buffer, std::size_t count, const PageLayout& layout) const {
+    return count <= buffer.capacity() && (parts_ == 1 || buffer.used() == layout.used);
   }
   template <class Program>
   void load() {}
@@ -217,12 +310,12 @@ class HostDevice {
     for (const SphereContact& c : found) *pairs++ = {c.a, c.b};
   }
   template <class Program>
-  void run(const Program& program, std::size_t) {
+  void run(const Program& program, std::size_t, std::uint32_t parts = 1) {
     if (runs_left_ >= 0 && runs_left_-- == 0) throw DeviceError("a program could not be started");
     if (graph_ == nullptr) {
-      program(team_);
+      run_on_parts(program, parts);
     } else {
-      graph_->work.push_back([=, this] { program(team_); });
+      graph_->work.push_back([=, this] { run_on_parts(program, parts); });
     }
   }
   void wait() {}
@@ -253,15 +346,35 @@ class HostDevice {
   }
 
  private:
+  template <class Program>
+  void run_on_parts(const Program& program, std::uint32_t parts) {
+    const std::uint64_t seed = ++runs_ << 32;
+    if (parts == 1) return program(HostTeam(&shared_, 0, 1, seed));
+    std::vector<std::thread> others;
+    const auto run_part = [&](std::uint32_t part) {
+      if (part == runs_ % parts) std::this_thread::sleep_for(std::chrono::microseconds(20));
+      program(HostTeam(&shared_by_all_, part, parts, seed + part));
+    };
+    for (std::uint32_t part = 1; part < parts; ++part) others.emplace_back(run_part, part);
+    run_part(0);
+    for (std::thread& thread : others) thread.join();
+  }
+
+  std::uint32_t parts_;
+  HostTeam::Shared shared_, shared_by_all_;
+  std::uint64_t runs_ = 0;
   int runs_left_ = -1;
   Graph* captured_ = nullptr;
   Graph* graph_ = nullptr;  ///< of the work in progress
   std::unique_ptr<SphereCollider> collider_ = make_sphere_collider({.backend = Backend::cpu});
-  HostTeam team_;
 };
 
 inline std::unique_ptr<DeviceWorld> make_host_device_world(const Scene& scene) {
   return std::make_unique<device::DeviceStep<HostDevice>>(scene, std::make_unique<HostDevice>());
+}
+/// A device with two parts, which share worlds with blocks.
+inline std::unique_ptr<DeviceWorld> make_two_part_world(const Scene& scene) {
+  return std::make_unique<device::DeviceStep<HostDevice>>(scene, std::make_unique<HostDevice>(2));
 }
 
 }  // namespace test

@@ -1,6 +1,7 @@
 /// The threads of a cooperative launch that run the program of a device step.
 #pragma once
 
+#include "src/base/atomic.hpp"
 #include "src/base/cuda/warp.cuh"
 #include "src/world/device/step_data.hpp"
 
@@ -16,32 +17,67 @@ struct alignas(4 * sizeof(Real)) SharedPiece {
   Real numbers[4];
 };
 
+/// Where the blocks of a device wait for those of the other devices of a launch.
+struct alignas(128) DeviceBarrier {
+  /// The upper half counts the barriers at which all blocks of the device have arrived.
+  std::uint32_t arrived;
+  std::uint32_t signals[device::kMostParts];  ///< by part: its `arrived` after its last block
+};
+
+/// The devices that run a program together.
+struct TeamParts {
+  std::uint32_t count = 1;                           ///< number of devices
+  std::uint32_t mine = 0;                            ///< number of this device
+  DeviceBarrier* barriers[device::kMostParts] = {};  ///< by part, in the memory of its device
+  /// In the memory of the host; not 0: the kernels end at the barrier.
+  const std::uint32_t* ended = nullptr;
+};
+
 /// Loops over items. All threads must call the same functions with the same item counts. scan() and
 /// partition() assign consecutive chunks of items to the blocks.
+///
+/// Several devices may run a program together: each is a **part** of the team, with the same number
+/// of blocks, and the loops give consecutive items to each part.
 class GridTeam {
  public:
   static constexpr unsigned kThreads = device::tuning::kThreads;
 
-  /// Words of scratch memory for a launch with this number of blocks.
-  static std::size_t scratch_words(unsigned blocks) {
-    return std::size_t{blocks} * (2 + std::max<std::size_t>(device::kBins, kDigits));
-  }
+  /// Shared memory of a block for partition().
+  static constexpr std::size_t kPartitionBytes =
+      device::kMostParts * (device::kBins + 1) * sizeof(std::uint32_t);
+  /// Words of scratch memory for a launch with this number of blocks on all devices.
+  static std::size_t scratch_words(unsigned blocks) { return std::size_t{blocks} * (2 + kDigits); }
 
   /// @param scratch device memory of scratch_words()
   /// @param is_cluster whether all blocks are one cluster, whose barrier is faster
-  JFPX_HD GridTeam(std::uint32_t* scratch, bool is_cluster)
-      : block_sums_(reinterpret_cast<std::uint64_t*>(scratch)), is_cluster_(is_cluster) {
+  /// @param parts the devices of the launch
+  JFPX_HD GridTeam(std::uint32_t* scratch, bool is_cluster, const TeamParts& parts)
+      : all_(&parts),
+        block_sums_(reinterpret_cast<std::uint64_t*>(scratch)),
+        parts_(parts.count),
+        part_(parts.mine),
+        is_cluster_(is_cluster) {
 #if defined(__CUDA_ARCH__)
-    blocks_ = gridDim.x;
-    block_ = blockIdx.x;
-    block_bins_ = scratch + 2 * gridDim.x;
+    blocks_ = parts.count * gridDim.x;
+    blocks_of_part_ = gridDim.x;
+    block_ = parts.mine * gridDim.x + blockIdx.x;
+    block_bins_ = scratch + 2 * blocks_;
 #endif
   }
 
   /// Barrier of all threads. Writes before it are visible to all threads after it.
   JFPX_HD void sync() const {
 #if defined(__CUDA_ARCH__)
-    if (blocks_ == 1) {
+    if (all_ == nullptr) {
+      if (has_peer_memory_) __threadfence_system();  // completes atomic operations there
+      __syncthreads();
+      return;
+    }
+    if (all_->count > 1) {
+      sync_devices();
+      return;
+    }
+    if (gridDim.x == 1) {
       __syncthreads();
       return;
     }
@@ -55,16 +91,44 @@ class GridTeam {
     cooperative_groups::this_grid().sync();
 #endif
   }
-  /// Copies an array of device::kBins + 1 numbers to shared memory. At most one copy exists at a
-  /// time.
-  JFPX_HD const std::uint32_t* cached_bins(const std::uint32_t* numbers) const {
+  /// sync() if there are several devices. A program begins and ends with it, so that it follows all
+  /// work in the stream of the first device, and precedes all later work there.
+  JFPX_HD void sync_parts() const {
 #if defined(__CUDA_ARCH__)
-    __shared__ std::uint32_t copy[device::kBins + 1];
-    for (std::uint32_t i = threadIdx.x; i <= device::kBins; i += kThreads) copy[i] = numbers[i];
+    if (all_->count > 1) sync_devices();
+#endif
+  }
+
+  /// Number of the part of this thread.
+  JFPX_HD std::uint32_t part() const { return part_; }
+  /// The threads of the part of this thread as a team. Its barriers are those of all parts, so all
+  /// parts must have the same number of them.
+  JFPX_HD GridTeam team_of_part() const {
+    GridTeam team = *this;
+#if defined(__CUDA_ARCH__)
+    team.block_sums_ += part_ * gridDim.x;
+    team.block_ -= part_ * gridDim.x;
+    team.blocks_ = gridDim.x;
+    team.parts_ = 1;
+    team.part_ = 0;
+#endif
+    return team;
+  }
+
+  /// Copies the bins of the part of this thread to shared memory. At most one copy exists at a
+  /// time.
+  /// @param bins by part
+  JFPX_HD const device::RowBins& cached_bins(const device::RowBins* bins) const {
+#if defined(__CUDA_ARCH__)
+    __shared__ device::RowBins copy;
+    constexpr std::uint32_t kWords = sizeof(device::RowBins) / sizeof(std::uint32_t);
+    const auto* from = reinterpret_cast<const std::uint32_t*>(&bins[part_]);
+    auto* to = reinterpret_cast<std::uint32_t*>(&copy);
+    for (std::uint32_t i = threadIdx.x; i < kWords; i += kThreads) to[i] = from[i];
     __syncthreads();
     return copy;
 #else
-    return numbers;
+    return *bins;
 #endif
   }
 
@@ -111,10 +175,14 @@ class GridTeam {
   /// Calls f(block, threads) for all blocks < n of a partition of work, in ascending order, each
   /// with the threads of one block of the launch. All calls with the same n assign a block to the
   /// same threads. The threads of a block wait for each other, but not for other blocks.
+  /// @param each see device::range_of_part()
   template <class F>
-  [[gnu::always_inline]] JFPX_HD void for_blocks(std::uint32_t n, const F& f) const {
+  [[gnu::always_inline]] JFPX_HD void for_blocks(std::uint32_t n, const F& f,
+                                                 std::uint32_t each) const {
 #if defined(__CUDA_ARCH__)
-    for (std::uint32_t block = block_; block < n; block += blocks_) {
+    const device::Range mine = range_of_part(n, each);
+    for (std::uint32_t block = mine.begin + block_in_part(); block < mine.end;
+         block += blocks_of_part_) {
       f(block, Threads());
       __syncthreads();
     }
@@ -122,30 +190,34 @@ class GridTeam {
   }
 
   /// Calls f(i) for all i < n, in any order, without a barrier.
+  /// @param each see device::range_of_part()
   template <class F>
-  JFPX_HD void for_each_nowait(std::uint32_t n, const F& f) const {
+  JFPX_HD void for_each_nowait(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
 #if defined(__CUDA_ARCH__)
-    for (std::uint32_t i = first(); i < n; i += blocks_ * kThreads) f(i);
+    const device::Range mine = range_of_part(n, each);
+    const std::uint32_t threads = blocks_of_part_ * kThreads;
+    for (std::uint32_t i = mine.begin + thread_in_part(); i < mine.end; i += threads) f(i);
 #endif
   }
   /// Calls f(i) for all i < n, in any order, then waits for all threads.
   template <class F>
-  JFPX_HD void for_each(std::uint32_t n, const F& f) const {
-    for_each_nowait(n, f);
+  JFPX_HD void for_each(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
+    for_each_nowait(n, f, each);
     sync();
   }
-  /// Calls f(thread, number of threads, sync) in each thread; all must call sync() equally often.
+  /// Calls f(thread, number of threads, sync) in each thread, with numbers in its part; all must
+  /// call sync() equally often.
   template <class F>
   [[gnu::always_inline]] JFPX_HD void for_each_thread(const F& f) const {
 #if defined(__CUDA_ARCH__)
-    f(first(), blocks_ * kThreads, [&] { sync(); });
+    f(thread_in_part(), blocks_of_part_ * kThreads, [&] { sync(); });
 #endif
   }
   /// Calls f in one thread, without a barrier.
   template <class F>
   JFPX_HD void once(const F& f) const {
 #if defined(__CUDA_ARCH__)
-    if (first() == 0) f();
+    if (block_ == 0 && part_ == 0 && threadIdx.x == 0) f();
 #endif
   }
   /// Calls f(team) with the threads of one block as a team, whose barriers are faster. No barrier
@@ -155,7 +227,9 @@ class GridTeam {
 #if defined(__CUDA_ARCH__)
     if (block_ != 0) return;
     GridTeam team = *this;
-    team.blocks_ = 1;
+    team.all_ = nullptr;
+    team.has_peer_memory_ = parts_ > 1;
+    team.blocks_ = team.blocks_of_part_ = team.parts_ = 1;
     f(team);
 #endif
   }
@@ -163,7 +237,7 @@ class GridTeam {
   /// Dataflow without a barrier: for all i < n, starts an item with begin(i, &item), waits until
   /// is_ready(item), and calls complete(item). An item may wait for items of lower warps (32 items
   /// each) and of earlier calls. All calls with the same n assign item i to the same thread; once()
-  /// always uses the same thread.
+  /// always uses the same thread. Only for one part.
   template <class Dataflow>
   [[gnu::always_inline]] JFPX_HD void run_dataflow(std::uint32_t n,
                                                    const Dataflow& dataflow) const {
@@ -187,25 +261,27 @@ class GridTeam {
 
   /// Adds the number of i < n for which condition(i) holds, without a barrier.
   template <class Condition>
-  JFPX_HD void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum) const {
+  JFPX_HD void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum,
+                     std::uint32_t each = 0) const {
 #if defined(__CUDA_ARCH__)
     std::uint32_t mine = 0;
-    for (std::uint32_t i = first(); i < n; i += blocks_ * kThreads) {
+    const auto add = [&](std::uint32_t i) {
       if (condition(i)) ++mine;
-    }
+    };
+    for_each_nowait(n, add, each);
     mine = warp_sum(mine);
-    if (lane_id() == 0 && mine > 0) atomicAdd(sum, mine);
+    if (lane_id() == 0 && mine > 0) atomic_add(sum, mine);
 #endif
   }
 
   /// Calls place(i, size(0) + ... + size(i - 1)) for all i < n. The size of an item is measure(i)
   /// in the first pass, called once, and size(i) in later passes. @returns the sum of all sizes
   template <class Measure, class Size, class Place>
-  JFPX_HD auto scan(std::uint32_t n, const Measure& measure, const Size& size,
-                    const Place& place) const -> decltype(size(0)) {
+  JFPX_HD auto scan(std::uint32_t n, const Measure& measure, const Size& size, const Place& place,
+                    std::uint32_t each = 0) const -> decltype(size(0)) {
     using Number = decltype(size(0));
 #if defined(__CUDA_ARCH__)
-    const device::Range chunk = chunk_of(n);
+    const device::Range chunk = chunk_of(n, each);
     Number mine = 0;
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
       mine += measure(i);
@@ -230,53 +306,58 @@ class GridTeam {
 #endif
   }
 
-  /// Calls place(i, position, bin) for all i < n with bin_of(i) < device::kBins. Positions are
-  /// consecutive and ascend by bin; the order within a bin is arbitrary.
-  /// @param bins  receives bin_of(i), which is called once
-  /// @param begin receives the first position of each bin, then the total number
-  template <class BinOf, class Place>
-  JFPX_HD void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* begin,
-                         const BinOf& bin_of, const Place& place) const {
+  /// Calls place(i, position, bin) for all i < n with bin_of(i) < device::kBins. The positions of a
+  /// part are consecutive, ascend by bin, and start at a multiple of `capacity`. The order within a
+  /// bin is arbitrary.
+  /// Uses kPartitionBytes of the shared memory of a block.
+  /// @param bins   receives part * (kBins + 1) + bin for each item, or kNoBin
+  /// @param sizes  by part, kBins + 1 numbers each, which must be 0; receives the sizes of the bins
+  /// @param begin  by part, receives the first position of each bin, and the end
+  /// @param bin_of called once for each item
+  /// @param part_of called once for each item that has a bin
+  template <class BinOf, class PartOf, class Place>
+  JFPX_HD void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* sizes,
+                         device::RowBins* begin, std::uint32_t capacity, const BinOf& bin_of,
+                         const PartOf& part_of, const Place& place, std::uint32_t each) const {
 #if defined(__CUDA_ARCH__)
-    constexpr std::uint32_t kBins = device::kBins;
-    __shared__ std::uint32_t next[kBins];
-    __shared__ std::uint32_t totals[kBins];
-    const device::Range chunk = chunk_of(n);
-    for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) next[b] = 0;
+    constexpr std::uint32_t kStride = device::kBins + 1;
+    static_assert(device::kMostParts * kStride < soft_step::kNoBin);
+    auto* const next = static_cast<std::uint32_t*>(Threads().shared(kPartitionBytes));
+    const device::Range chunk = chunk_of(n, each);
+    for (std::uint32_t b = threadIdx.x; b < parts_ * kStride; b += kThreads) next[b] = 0;
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
-      const std::uint16_t bin = bin_of(i);
+      std::uint16_t bin = bin_of(i);
+      if (bin < device::kBins) {
+        if (parts_ > 1) bin += static_cast<std::uint16_t>(part_of(i, bin) * kStride);
+        atomicAdd(&next[bin], 1u);
+      }
       bins[i] = bin;
-      if (bin < kBins) atomicAdd(&next[bin], 1u);
     }
     __syncthreads();
-    for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) {
-      block_bins_[block_ * kBins + b] = next[b];
+    for (std::uint32_t b = threadIdx.x; b < parts_ * kStride; b += kThreads) {
+      if (next[b] > 0) next[b] = atomic_add(&sizes[b], next[b]);
     }
     sync();
-    for (std::uint32_t b = threadIdx.x; b < kBins; b += kThreads) {
-      std::uint32_t total = 0, before = 0;
-      for (std::uint32_t block = 0; block < blocks_; ++block) {
-        if (block == block_) before = total;
-        total += block_bins_[block * kBins + b];
+    for (std::uint32_t part = 0; part < parts_; ++part) {
+      std::uint32_t before = part * capacity;
+      for (std::uint32_t tile = 0; tile < kStride; tile += kThreads) {
+        const std::uint32_t b = tile + threadIdx.x;
+        std::uint32_t sum = 0;
+        const std::uint32_t size = b < kStride ? sizes[part * kStride + b] : 0;
+        const std::uint32_t first = before + block_scan(size, &sum);
+        before += sum;
+        if (b >= kStride) continue;
+        next[part * kStride + b] += first;
+        if (block_ == 0) begin[part].begin[b] = first;
       }
-      next[b] = before;
-      totals[b] = total;
-    }
-    __syncthreads();
-    if (threadIdx.x == 0) {
-      std::uint32_t first = 0;
-      for (std::uint32_t b = 0; b < kBins; ++b) {
-        if (block_ == 0) begin[b] = first;
-        next[b] += first;
-        first += totals[b];
-      }
-      if (block_ == 0) begin[kBins] = first;
     }
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
       const std::uint16_t bin = bins[i];
-      if (bin < kBins) place(i, atomicAdd(&next[bin], 1u), bin);
+      if (bin != soft_step::kNoBin) {
+        place(i, atomicAdd(&next[bin], 1u), static_cast<std::uint16_t>(bin % kStride));
+      }
     }
     sync();
 #endif
@@ -370,15 +451,63 @@ class GridTeam {
     return true;
   }
 
-  __device__ std::uint32_t first() const { return block_ * kThreads + threadIdx.x; }
+  __device__ std::uint32_t block_in_part() const { return block_ - part_ * blocks_of_part_; }
+  __device__ std::uint32_t thread_in_part() const {
+    return block_in_part() * kThreads + threadIdx.x;
+  }
+  /// The items of the part of this thread.
+  __device__ device::Range range_of_part(std::uint32_t n, std::uint32_t each = 0) const {
+    return device::range_of_part(n, part_, parts_, each);
+  }
+
+  /// Barrier of all blocks of all devices.
+  __noinline__ __device__ void sync_devices() const {
+    __syncthreads();
+    bool ends = false;
+    if (threadIdx.x == 0) {
+      constexpr std::uint32_t kBarrier = 0x10000u;
+      const std::uint32_t mine = all_->mine, count = all_->count;
+      DeviceBarrier* const barrier = all_->barriers[mine];
+      // Another device may already have arrived at the next barrier.
+      const auto passes = [](const std::uint32_t* at, std::uint32_t before) {
+        const std::uint32_t barriers = load_shared(at) / kBarrier - before / kBarrier;
+        return static_cast<std::int16_t>(barriers) > 0;
+      };
+      __threadfence();  // the last block makes the writes of all visible to other devices
+      const std::uint32_t increment = blockIdx.x == 0 ? kBarrier - (gridDim.x - 1) : 1;
+      const std::uint32_t before = atomic_add(&barrier->arrived, increment);
+      const std::uint32_t after = before + increment;
+      if (before / kBarrier != after / kBarrier) {  // the last block of the device
+        __threadfence_system();
+        for (std::uint32_t part = 0; part < count; ++part) {
+          if (part != mine) store_shared(&all_->barriers[part]->signals[mine], after);
+        }
+      }
+      while (!passes(&barrier->arrived, before)) {
+      }
+      constexpr std::uint32_t kPollsPerLook = 1024;
+      for (std::uint32_t part = 0; part < count; ++part) {
+        for (std::uint32_t polls = 1; part != mine && !ends; ++polls) {
+          if (passes(&barrier->signals[part], before)) break;
+          if (polls % kPollsPerLook == 0) ends = load_shared(all_->ended) != 0;
+        }
+      }
+      __threadfence_system();
+    }
+    if (__syncthreads_or(ends ? 1 : 0) != 0) asm volatile("exit;");
+  }
 
   /// The chunk of items of this block.
-  __device__ device::Range chunk_of(std::uint32_t n) const {
-    const std::uint32_t tiles = (n + kThreads - 1) / kThreads;
-    const std::uint32_t size = (tiles + blocks_ - 1) / blocks_ * kThreads;
-    const std::uint64_t begin = std::uint64_t{block_} * size;
-    return {static_cast<std::uint32_t>(begin < n ? begin : n),
-            static_cast<std::uint32_t>(begin + size < n ? begin + size : n)};
+  __device__ device::Range chunk_of(std::uint32_t n, std::uint32_t each = 0) const {
+    const device::Range mine = range_of_part(n, each);
+    const std::uint32_t count = mine.end - mine.begin, blocks = blocks_of_part_;
+    const std::uint32_t tiles = (count + kThreads - 1) / kThreads;
+    const std::uint32_t size = (tiles + blocks - 1) / blocks * kThreads;
+    const std::uint64_t begin = std::uint64_t{block_in_part()} * size;
+    const auto item = [&](std::uint64_t i) {
+      return mine.begin + static_cast<std::uint32_t>(i < count ? i : count);
+    };
+    return {item(begin), item(begin + size)};
   }
 
   /// Exclusive prefix sum of `value` in the block. @param sum receives the sum over all threads
@@ -415,9 +544,13 @@ class GridTeam {
   }
 #endif
 
+  const TeamParts* all_;  ///< of the launch; null: a team of one block
   std::uint64_t* block_sums_;
-  std::uint32_t* block_bins_ = nullptr;   ///< by block and bin
+  std::uint32_t* block_bins_ = nullptr;   ///< by block and digit
   std::uint32_t blocks_ = 1, block_ = 0;  ///< of the team, and this thread's
+  std::uint32_t blocks_of_part_ = 1;
+  std::uint32_t parts_, part_;    ///< of the team, and this thread's
+  bool has_peer_memory_ = false;  ///< whether a team of one block uses memory of other devices
   bool is_cluster_;
 };
 

@@ -12,8 +12,12 @@ namespace cuda {
 
 template <class Program>
 __global__ void __launch_bounds__(GridTeam::kThreads, Program::kBlocksPerMultiprocessor)
-    run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster) {
-  program(GridTeam(scratch, is_cluster));
+    run_program(const __grid_constant__ Program program, std::uint32_t* scratch, bool is_cluster,
+                const __grid_constant__ TeamParts parts) {
+  const GridTeam team(scratch, is_cluster, parts);
+  team.sync_parts();
+  program(team);
+  team.sync_parts();
 }
 
 template <class Program>

@@ -8,8 +8,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// The kernel of a program. Its parameters are the program, the scratch memory of its GridTeam, and
-/// whether its blocks are one cluster (program_kernel.cuh). Instantiated in one of the files
+/// The kernel of a program. Its parameters are the program and those of the GridTeam
+/// (program_kernel.cuh). Instantiated in one of the files
 /// *_programs.cu; a program that is missing there is a link error.
 template <class Program>
 const void* program_kernel();

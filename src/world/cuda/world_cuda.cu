@@ -2,7 +2,9 @@
 /// files of their own (program_kernel.hpp).
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/base/cuda/device_code.hpp"
+#include "src/base/cuda/mapped_memory.hpp"
 #include "src/base/cuda/ordering_event.hpp"
+#include "src/base/cuda/probe.hpp"
 #include "src/base/parallel_for.hpp"
 #include "src/sphere_collider/cuda/device_search.hpp"
 #include "src/world/cuda/grid_team.cuh"
@@ -11,11 +13,16 @@
 #include "src/world/device/device_step.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstring>
+#include <limits>
+#include <memory>
+#include <mutex>
 #include <string>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -24,41 +31,155 @@ namespace {
 
 namespace tuning = device::tuning;
 
-/// The stream, the memory and the launches of a DeviceStep.
+/// Memory of the first device of a world, or of all of them.
+class WorldMemory {
+ public:
+  WorldMemory() = default;
+  explicit WorldMemory(DeviceMemory memory) : of_one_(std::move(memory)) {}
+  /// @param stream in which the devices use the memory
+  WorldMemory(MappedMemory memory, Stream stream) : of_all_(std::move(memory)), stream_(stream) {}
+  ~WorldMemory() {
+    if (of_all_.data() != nullptr) static_cast<void>(cudaStreamSynchronize(stream_));
+  }
+  WorldMemory(WorldMemory&&) noexcept = default;
+  WorldMemory& operator=(WorldMemory&& other) noexcept {
+    std::swap(of_one_, other.of_one_);
+    std::swap(of_all_, other.of_all_);
+    std::swap(stream_, other.stream_);
+    return *this;
+  }
+  void* data() const noexcept {
+    return of_all_.data() != nullptr ? of_all_.data() : of_one_.data();
+  }
+
+ private:
+  DeviceMemory of_one_;
+  MappedMemory of_all_;
+  Stream stream_ = nullptr;
+};
+
+/// Orders the programs of all worlds on several devices. Otherwise, the program of one world could
+/// occupy one device, and that of another world another one, and both would wait for ever for the
+/// rest of their threads.
+class SharedDevices {
+ public:
+  static SharedDevices& instance() {
+    static SharedDevices devices;
+    return devices;
+  }
+  /// Calls launch() after the work that has been launched so far.
+  /// @param world identifies the caller; its own programs are in order already
+  /// @param first stream of the first device, whose work ends after that of the others
+  /// @param all the streams of all devices
+  template <class Launch>
+  void run(const void* world, int device, Stream first, const std::vector<Stream>& all,
+           const Launch& launch) {
+    const std::lock_guard lock(mutex_);
+    if (last_ != nullptr && last_ != world) {
+      const DeviceGuard guard(last_device_);
+      OrderingEvent event(last_device_);
+      for (const Stream stream : all) event.order(last_stream_, stream);
+    }
+    last_ = world;
+    last_device_ = device;
+    last_stream_ = first;
+    launch();
+  }
+  /// To be called before the streams of a world are destroyed, after all of its work.
+  void leave(const void* world) {
+    const std::lock_guard lock(mutex_);
+    if (last_ == world) last_ = nullptr;
+  }
+
+ private:
+  std::mutex mutex_;
+  const void* last_ = nullptr;
+  int last_device_ = 0;
+  Stream last_stream_ = nullptr;
+};
+
+/// The devices of a world. @throws BackendUnavailable if they cannot share memory
+std::vector<int> usable_devices(const std::vector<int>& devices) {
+  if (devices.size() > device::kMostParts) {
+    throw InvalidArgument("devices has " + std::to_string(devices.size()) + " GPUs; at most " +
+                          std::to_string(device::kMostParts) + " can share a world");
+  }
+  for (const int device : devices) usable_device(device);
+  if (const std::string reason = why_not_shared(devices); !reason.empty()) {
+    throw BackendUnavailable(reason);
+  }
+  return devices;
+}
+
+/// The streams, the memory and the launches of a DeviceStep. Programs that several devices share
+/// begin and end together, so the stream of the first device orders all work.
 class CudaDevice {
  public:
   template <class T>
-  using Buffer = DeviceBuffer<T>;
+  class Buffer {
+   public:
+    T* data() const noexcept { return array_.data(); }
+    std::size_t capacity() const noexcept { return array_.capacity(); }
+    void swap(Buffer& other) noexcept {
+      array_.swap(other.array_);
+      std::swap(used_, other.used_);
+    }
 
-  explicit CudaDevice(int device)
-      : device_(usable_device(device)),
+   private:
+    friend CudaDevice;
+    GrowableArray<T, WorldMemory> array_;
+    double used_ = 0;  ///< PageLayout::used of an array that all devices share; otherwise 0
+  };
+
+  /// @param devices by part; a device may occur more than once
+  explicit CudaDevice(const std::vector<int>& devices)
+      : devices_(usable_devices(devices)),
+        device_(devices_[0]),
         stream_(device_),
         pool_(device_),
         marks_{OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_), OwnedEvent(device_)},
         order_(device_),
         search_(stream_.get(), device_, SphereAlgorithm::automatic) {
+    multiprocessors_ = std::numeric_limits<int>::max();
+    for (const int device : devices_) {
+      int count = 0;
+      JFPX_CUDA_TRY(cudaDeviceGetAttribute(&count, cudaDevAttrMultiProcessorCount, device));
+      multiprocessors_ = std::min(multiprocessors_, count);
+    }
+    if (devices_.size() > 1) start_parts();
     const DeviceGuard guard(device_);
-    JFPX_CUDA_TRY(
-        cudaDeviceGetAttribute(&multiprocessors_, cudaDevAttrMultiProcessorCount, device_));
     // Sized for every program, because captured graphs contain the address.
-    const unsigned blocks = tuning::kMost * static_cast<unsigned>(multiprocessors_);
+    const unsigned blocks = parts() * tuning::kMost * static_cast<unsigned>(multiprocessors_);
     scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
+  }
+  ~CudaDevice() {
+    if (devices_.size() == 1) return;
+    for (const Stream stream : streams_) static_cast<void>(cudaStreamSynchronize(stream));
+    SharedDevices::instance().leave(this);
   }
 
   int number() const noexcept { return device_; }
   Stream stream() const noexcept { return stream_.get(); }
+  std::uint32_t parts() const noexcept { return static_cast<std::uint32_t>(devices_.size()); }
+  void use_parts(std::uint32_t parts) { shares_memory_ = parts > 1; }
 
   template <class T>
-  void reserve(Buffer<T>* buffer, std::size_t count, const char* what) {
+  void reserve(Buffer<T>* buffer, std::size_t count, const char* what, const PageLayout& layout) {
     if (count <= buffer->capacity()) return;
-    const DeviceGuard guard(device_);
-    buffer->reserve_geometric(pool_, stream_.get(), count, what);
+    const std::size_t capacity = geometric_capacity(buffer->capacity(), count);
+    PageLayout with_slack = layout;
+    with_slack.used *= static_cast<double>(count) / static_cast<double>(capacity);
+    replace(buffer, capacity, what, with_slack);
   }
   template <class T>
-  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char* what) {
-    if (count <= buffer->capacity()) return;
-    const DeviceGuard guard(device_);
-    buffer->reserve(pool_, stream_.get(), count, what);
+  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char* what,
+                       const PageLayout& layout) {
+    if (!fits(*buffer, count, layout)) replace(buffer, count, what, layout);
+  }
+  /// Whether a buffer has room, in pages of this layout if all devices share it.
+  template <class T>
+  bool fits(const Buffer<T>& buffer, std::size_t count, const PageLayout& layout) const {
+    return count <= buffer.capacity() && (buffer.used_ == 0 || buffer.used_ == layout.used);
   }
   /// Loads a program, so that it can be launched while a stream is being captured.
   template <class Program>
@@ -121,39 +242,42 @@ class CudaDevice {
                  {.pairs = pairs, .capacity = capacity, .count = count}, target_);
   }
 
+  /// @param parts 1, or parts()
   template <class Program>
-  void run(const Program& program, std::size_t items) {
+  void run(const Program& program, std::size_t items, std::uint32_t parts = 1) {
     const DeviceGuard guard(device_);
     const Launch& limits = limits_of<Program>();
-    const std::size_t wanted = (items + GridTeam::kThreads - 1) / GridTeam::kThreads;
-    std::size_t most = limits.most_blocks;
+    const std::size_t share = items / parts;
+    const std::size_t wanted = (share + GridTeam::kThreads - 1) / GridTeam::kThreads;
+    std::size_t most = parts == 1 ? limits.most_blocks : limits.most_blocks_of_part;
     if constexpr (requires { Program::kItemsPerThread; }) {
-      most = std::clamp(items / (GridTeam::kThreads * Program::kItemsPerThread),
+      most = std::clamp(share / (GridTeam::kThreads * Program::kItemsPerThread),
                         static_cast<std::size_t>(multiprocessors_), most);
     }
     auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
-    if (limits.has_clusters && blocks <= 2 * tuning::kClusterBlocks) {
+    const bool has_clusters = limits.has_clusters && parts == 1;
+    if (has_clusters && blocks <= 2 * tuning::kClusterBlocks) {
       blocks = std::min(blocks, tuning::kClusterBlocks);
     }
-    bool is_cluster = limits.has_clusters && blocks > 1 && blocks <= tuning::kClusterBlocks;
-    cudaLaunchAttribute attribute{};
-    if (is_cluster) {
-      attribute.id = cudaLaunchAttributeClusterDimension;
-      attribute.val.clusterDim = {blocks, 1, 1};
-    } else {
-      attribute.id = cudaLaunchAttributeCooperative;
-      attribute.val.cooperative = 1;
-    }
-    cudaLaunchConfig_t config{};
-    config.gridDim = blocks;
-    config.blockDim = GridTeam::kThreads;
-    config.dynamicSmemBytes = shared_bytes<Program>();
-    config.stream = target_;
-    config.attrs = &attribute;
-    config.numAttrs = 1;
-    std::uint32_t* scratch = scratch_.data();
-    void* arguments[] = {const_cast<Program*>(&program), &scratch, &is_cluster};
-    JFPX_CUDA_TRY(cudaLaunchKernelExC(&config, program_kernel<Program>(), arguments));
+    const bool is_cluster = has_clusters && blocks > 1 && blocks <= tuning::kClusterBlocks;
+    if (parts == 1) return launch(program, blocks, is_cluster, target_, {});
+    SharedDevices::instance().run(this, device_, stream_.get(), streams_, [&] {
+      // The memory of the pool is allocated in the first stream, and a search needs a whole device.
+      for (std::size_t part = 1; part < streams_.size(); ++part) {
+        order_.order(streams_[0], streams_[part]);
+      }
+      for (std::uint32_t part = 0; part < parts; ++part) {
+        TeamParts team = parts_;
+        team.mine = part;
+        try {
+          const DeviceGuard other(devices_[part]);
+          launch(program, blocks, false, streams_[part], team);
+        } catch (...) {
+          release_parts(part);
+          throw;
+        }
+      }
+    });
   }
 
   void wait() {
@@ -206,12 +330,14 @@ class CudaDevice {
  private:
   /// Limits of the launches of a program.
   struct Launch {
-    std::size_t most_blocks = 0;  ///< number of resident blocks; 0: not yet known
+    std::size_t most_blocks = 0;          ///< number of resident blocks; 0: not yet known
+    std::size_t most_blocks_of_part = 0;  ///< likewise, of each of several parts
     bool has_clusters = false;
   };
 
-  /// At least the static shared memory of a program.
+  /// At least the static shared memory of the programs with the most dynamic shared memory.
   static constexpr std::size_t kStaticShared = 4096;
+  static_assert(device::PrepareProgram::kSharedBytes >= GridTeam::kPartitionBytes);
 
   /// Bytes of shared memory of a block.
   template <class Program>
@@ -226,33 +352,126 @@ class CudaDevice {
     Launch& limits = std::get<Limits<Program>>(limits_);
     if (limits.most_blocks > 0) return limits;
     const void* const kernel = program_kernel<Program>();
-    int resident = 0;
     constexpr std::size_t kShared = shared_bytes<Program>();
-    int most_shared = 0;
-    JFPX_CUDA_TRY(
-        cudaDeviceGetAttribute(&most_shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device_));
-    if (kShared + kStaticShared > static_cast<std::size_t>(most_shared)) {
-      throw DeviceError(
-          "a world with more than " + std::to_string(soft_step::kMostBodiesInOneBlock) +
-          " movable bodies needs " + std::to_string(kShared + kStaticShared) +
-          " bytes of shared memory for a block; this GPU has " + std::to_string(most_shared));
+    std::size_t least = std::numeric_limits<std::size_t>::max(), least_of_part = least;
+    for (const int device : devices_) {
+      const DeviceGuard guard(device);
+      int most_shared = 0, resident = 0;
+      JFPX_CUDA_TRY(
+          cudaDeviceGetAttribute(&most_shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
+      if (kShared + kStaticShared > static_cast<std::size_t>(most_shared)) {
+        throw DeviceError(
+            "a world with more than " + std::to_string(soft_step::kMostBodiesInOneBlock) +
+            " movable bodies needs " + std::to_string(kShared + kStaticShared) +
+            " bytes of shared memory for a block; this GPU has " + std::to_string(most_shared));
+      }
+      JFPX_CUDA_TRY(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                         static_cast<int>(kShared)));
+      JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, kernel,
+                                                                  GridTeam::kThreads, kShared));
+      const std::size_t blocks = std::min<std::size_t>(static_cast<unsigned>(resident),
+                                                       Program::kBlocksPerMultiprocessor) *
+                                 static_cast<unsigned>(multiprocessors_);
+      const auto times = static_cast<std::size_t>(std::ranges::count(devices_, device));
+      if (device == device_) least = std::min(least, blocks);
+      least_of_part = std::min(least_of_part, blocks / times);
     }
-    JFPX_CUDA_TRY(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                       static_cast<int>(kShared)));
-    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, kernel,
-                                                                GridTeam::kThreads, kShared));
     limits.has_clusters = has_hopper_code();
     if (limits.has_clusters) {
       JFPX_CUDA_TRY(
           cudaFuncSetAttribute(kernel, cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
     }
-    limits.most_blocks =
-        std::min<std::size_t>(static_cast<unsigned>(resident), Program::kBlocksPerMultiprocessor) *
-        static_cast<unsigned>(multiprocessors_);
+    limits.most_blocks_of_part = least_of_part;
+    limits.most_blocks = least;
     return limits;
   }
   template <class Program>
   struct Limits : Launch {};
+
+  /// Gives a buffer other memory: of all devices for a large array, otherwise of the first one.
+  template <class T>
+  void replace(Buffer<T>* buffer, std::size_t capacity, const char* what,
+               const PageLayout& layout) {
+    const DeviceGuard guard(device_);
+    const bool is_shared = shares_memory_ && layout.is_shared &&
+                           capacity * sizeof(T) >= devices_.size() * MappedMemory::kPage;
+    GrowableArray<T, WorldMemory> array;
+    array.reserve(capacity, [&](std::size_t bytes) {
+      if (!is_shared) return WorldMemory(DeviceMemory(pool_, stream_.get(), bytes, what));
+      return WorldMemory(MappedMemory(devices_, bytes, layout, what), stream_.get());
+    });
+    buffer->array_.swap(array);
+    buffer->used_ = is_shared ? layout.used : 0;
+  }
+
+  /// Creates what several devices need.
+  void start_parts() {
+    share(pool_, devices_);
+    streams_.push_back(stream_.get());
+    for (std::size_t part = 1; part < devices_.size(); ++part) {
+      other_streams_.push_back(std::make_unique<OwnedStream>(devices_[part]));
+      streams_.push_back(other_streams_.back()->get());
+    }
+    ended_.reserve(1, "barriers");
+    *ended_.data() = 0;
+    parts_.ended = ended_.data();
+    barriers_ = MappedMemory(devices_, devices_.size() * MappedMemory::kPage, {}, "barriers");
+    parts_.count = parts();
+    for (std::size_t part = 0; part < devices_.size(); ++part) {
+      parts_.barriers[part] = reinterpret_cast<DeviceBarrier*>(
+          static_cast<std::byte*>(barriers_.data()) + part * MappedMemory::kPage);
+    }
+    reset_barriers();
+  }
+  void reset_barriers() {
+    const DeviceGuard guard(device_);
+    for (std::size_t part = 0; part < devices_.size(); ++part) {
+      JFPX_CUDA_TRY(
+          cudaMemsetAsync(parts_.barriers[part], 0, sizeof(DeviceBarrier), stream_.get()));
+    }
+    JFPX_CUDA_TRY(cudaStreamSynchronize(stream_.get()));
+  }
+  /// Ends the launches of the first parts of a program that could not be launched for the others.
+  /// They wait at their first barrier and have changed nothing.
+  void release_parts(std::uint32_t launched) {
+    if (launched == 0) return;
+    // Earlier programs must not be ended.
+    for (std::uint32_t part = launched; part < parts(); ++part) {
+      static_cast<void>(cudaStreamSynchronize(streams_[part]));
+    }
+    std::atomic_ref(*ended_.data()).store(1);
+    for (std::uint32_t part = 0; part < launched; ++part) {
+      static_cast<void>(cudaStreamSynchronize(streams_[part]));
+    }
+    std::atomic_ref(*ended_.data()).store(0);
+    static_cast<void>(cudaGetLastError());
+    reset_barriers();
+  }
+
+  /// Launches a program on the current device.
+  template <class Program>
+  void launch(const Program& program, unsigned blocks, bool is_cluster, Stream stream,
+              const TeamParts& parts) {
+    cudaLaunchAttribute attribute{};
+    if (is_cluster) {
+      attribute.id = cudaLaunchAttributeClusterDimension;
+      attribute.val.clusterDim = {blocks, 1, 1};
+    } else {
+      attribute.id = cudaLaunchAttributeCooperative;
+      attribute.val.cooperative = 1;
+    }
+    cudaLaunchConfig_t config{};
+    config.gridDim = blocks;
+    config.blockDim = GridTeam::kThreads;
+    config.dynamicSmemBytes = shared_bytes<Program>();
+    config.stream = stream;
+    config.attrs = &attribute;
+    config.numAttrs = 1;
+    std::uint32_t* scratch = scratch_.data();
+    void* arguments[] = {const_cast<Program*>(&program), &scratch, &is_cluster,
+                         const_cast<TeamParts*>(&parts)};
+    JFPX_CUDA_TRY(cudaLaunchKernelExC(&config, program_kernel<Program>(), arguments));
+  }
 
   template <class T>
   void transfer(T* to, const T* from, std::size_t count, cudaMemcpyKind kind) {
@@ -261,7 +480,8 @@ class CudaDevice {
     JFPX_CUDA_TRY(cudaMemcpyAsync(to, from, count * sizeof(T), kind, stream_.get()));
   }
 
-  int device_;
+  std::vector<int> devices_;  ///< by part
+  int device_;                ///< the first one
   OwnedStream stream_;
   Stream target_ = stream_.get();  ///< of launches: `stream_`, or one that is being captured
   MemoryPool pool_;
@@ -270,7 +490,14 @@ class CudaDevice {
   DeviceSearch search_;
   DeviceBuffer<std::uint32_t> scratch_;
   PinnedBuffer<std::byte> staging_;
-  int multiprocessors_ = 0;
+  int multiprocessors_ = 0;  ///< of each device
+  // Of several devices.
+  std::vector<std::unique_ptr<OwnedStream>> other_streams_;
+  std::vector<Stream> streams_;  ///< by part
+  bool shares_memory_ = false;   ///< whether all devices share memory that is reserved now
+  MappedMemory barriers_;
+  PinnedBuffer<std::uint32_t> ended_;  ///< TeamParts::ended
+  TeamParts parts_;
   std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,
              Limits<device::SphereProgram>, Limits<device::ShapeProgram>,
              Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
@@ -285,9 +512,9 @@ class CudaDevice {
 
 }  // namespace
 
-std::unique_ptr<DeviceWorld> make_world(const Scene& scene, int device) {
+std::unique_ptr<DeviceWorld> make_world(const Scene& scene, const std::vector<int>& devices) {
   return std::make_unique<device::DeviceStep<CudaDevice>>(scene,
-                                                          std::make_unique<CudaDevice>(device));
+                                                          std::make_unique<CudaDevice>(devices));
 }
 
 }  // namespace cuda

@@ -3,12 +3,15 @@
 
 #include "src/world/device/device_world.hpp"
 
+#include <memory>
+#include <vector>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// @throws BackendUnavailable with the reason, DeviceError
-std::unique_ptr<DeviceWorld> make_world(const Scene& scene, int device);
+/// See make_device_world().
+std::unique_ptr<DeviceWorld> make_world(const Scene& scene, const std::vector<int>& devices);
 
 }  // namespace cuda
 }  // namespace JFPX_ABI

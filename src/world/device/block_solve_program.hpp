@@ -58,8 +58,8 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     if (data.has_failed() || !is_selected()) return;
     const StepData& d = data;
     const SweepList sweeps{d.substeps, d.counters->any_rebound != 0, d.joint_sweeps()};
-    Sweep sweep(team.cached_bins(d.counters->bin_begin), sweeps);
-    const bool has_overflow = sweep.overflow() > 0;
+    Sweep sweep(team.cached_bins(d.bins), sweeps);
+    const bool has_overflow = overflow_rows(d.bins->begin) > 0;
     for (std::uint32_t s = 0; s <= sweeps.size(); ++s) {
       sweep.number = s;
       BlockPhase phase{.sweeps = sweeps, .sweep = s};
@@ -92,14 +92,9 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
 
   /// Whether this program has the kinds of rows of the step, and no program with fewer kinds has.
   JFPX_HD bool is_selected() const {
-    const StepData& d = data;
-    constexpr soft_step::RowKind kManifold = soft_step::kKindOf<soft_step::ManifoldRow>;
-    if (d.world_joints.count > 0) return kKinds == soft_step::kRowKinds;
-    const std::uint32_t* begin = d.counters->bin_begin;
-    const std::uint32_t manifolds = begin[soft_step::bin_of(kManifold + 1u, 0)] -
-                                    begin[soft_step::bin_of(kManifold, 0)] +
-                                    d.counters->inner_rows[kManifold];
-    return kKinds == (manifolds > 0 ? soft_step::kContactRowKinds : kSphereRowKinds);
+    if (data.world_joints.count > 0) return kKinds == soft_step::kRowKinds;
+    const bool has_manifolds = data.counters->manifold_rows > 0;
+    return kKinds == (has_manifolds ? soft_step::kContactRowKinds : kSphereRowKinds);
   }
 
   /// Calls f(operation) with the operation of a sweep, if there is one.
@@ -144,8 +139,10 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     constexpr soft_step::RowKind kKind = soft_step::kKindOf<soft_step::SphereRow>;
     const std::uint32_t* const begin =
         sweep.begin + soft_step::bin_of(kKind, soft_step::group_of_crossing(0));
+    const std::uint32_t colors = sweep.bins.crossing_colors;
+    const auto has_color = [&](std::uint32_t color) { return color < colors; };
     team.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
-      for_colors(begin, thread, count, sync, [&](std::uint32_t r, const auto& row) {
+      for_colors(begin, has_color, thread, count, sync, [&](std::uint32_t r, const auto& row) {
         typename Base::RowItem item;
         this->begin_row(r, row, &item);
         this->read_bodies(&item);
@@ -158,33 +155,35 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
   template <class Team, class Operation>
   [[gnu::always_inline]] JFPX_HD void solve_crossing_kinds(const Team& team, const Sweep& sweep,
                                                            const Operation& operation) const {
-    for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
-      bool has_rows = false;
+    const auto part = team.team_of_part();
+    const std::uint32_t colors = sweep.bins.crossing_colors;
+    for (std::uint32_t color = 0; color < colors; ++color) {
       for (soft_step::RowKind kind = 0; kind < kKinds; ++kind) {
         const std::uint32_t bin = soft_step::bin_of(kind, soft_step::group_of_crossing(color));
         const std::uint32_t first = sweep.begin[bin], rows = sweep.size(bin);
-        has_rows = has_rows || rows > 0;
-        team.for_each_nowait(rows, [&](std::uint32_t i) {
+        part.for_each_nowait(rows, [&](std::uint32_t i) {
           typename Base::RowItem item;
           this->begin_row(sweep, first + i, &item);
           this->read_bodies(&item);
           this->solve_row(sweep, operation, &item);
         });
       }
-      if (has_rows) team.sync();
+      team.sync();
     }
   }
 
   /// Calls solve(r, row) for the rows of spheres of each color with the rows of a thread, and
   /// sync() after each color. A thread loads its next row before it solves a row.
   /// @param begin the first rows by color, and the end
-  template <class Sync, class Solve>
-  [[gnu::always_inline]] JFPX_HD void for_colors(const std::uint32_t* begin, std::uint32_t thread,
+  /// @param has_color whether a color is below the end of the colors
+  template <class HasColor, class Sync, class Solve>
+  [[gnu::always_inline]] JFPX_HD void for_colors(const std::uint32_t* begin,
+                                                 const HasColor& has_color, std::uint32_t thread,
                                                  std::uint32_t count, const Sync& sync,
                                                  const Solve& solve) const {
     const std::uint32_t last = begin[soft_step::kColorsPerClass];
     soft_step::SphereRow ahead;
-    std::uint32_t next = 0;
+    std::uint32_t next = last;  // a part may have no rows of colors that other parts have
     const auto load = [&](std::uint32_t color, std::uint32_t row) {
       next = row;
       while (next >= begin[color + 1] && begin[color + 1] < last) {
@@ -194,7 +193,7 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
       if (next < last) ahead = data.sphere_rows.load(next);
     };
     if (begin[0] < last) load(0, begin[0] + thread);
-    for (std::uint32_t color = 0; begin[color] < last; ++color) {
+    for (std::uint32_t color = 0; has_color(color); ++color) {
       while (next < begin[color + 1]) {
         const soft_step::SphereRow row = ahead;
         const std::uint32_t r = next;
@@ -210,9 +209,10 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
                                                  const BlockPhase& phase) const {
     Sweep before = sweep;
     if (phase.sweep > 0) before.number = phase.sweep - 1;
-    team.for_blocks(data.block_count(), [&](std::uint32_t block, const auto& threads) {
+    const auto run = [&](std::uint32_t block, const auto& threads) {
       run_block(threads, before, phase, block);
-    });
+    };
+    team.for_blocks(sweep.bins.blocks.all(), run, data.blocks_of_part);
   }
 
   /// @param before the sweep before, whose rows with fixed bodies are solved
@@ -221,10 +221,11 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
                                                 const BlockPhase& phase,
                                                 std::uint32_t block) const {
     const StepData& d = data;
-    const Range places = d.places_of(block);
+    const BlockCounts& blocks = before.bins.blocks;
+    const Range places = blocks.indices_of(block);
     const std::uint32_t count = places.end - places.begin;
     const Motion motion(threads.shared(kSharedBytes));
-    const bool has_inner = phase.inner_sweep() != SweepKind::none && block < d.placed_blocks();
+    const bool has_inner = phase.inner_sweep() != SweepKind::none && block < blocks.placed();
     threads.for_each(
         count, [&](std::uint32_t i) { complete_body(before, phase, motion, i, places.begin + i); });
     if (has_inner) {
@@ -294,8 +295,12 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
                                                           const Operation& operation,
                                                           const Motion& motion,
                                                           std::uint32_t first_place) const {
+    const std::uint32_t* const begin = motion.row_begin(0);
+    const auto has_color = [&](std::uint32_t color) {
+      return begin[color] < begin[soft_step::kColorsPerClass];
+    };
     threads.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
-      for_colors(motion.row_begin(0), thread, count, sync, [&](std::uint32_t r, const auto& row) {
+      for_colors(begin, has_color, thread, count, sync, [&](std::uint32_t r, const auto& row) {
         solve_inner_row(phase, operation, motion, first_place, r, row);
       });
     });

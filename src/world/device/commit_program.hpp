@@ -36,7 +36,7 @@ struct CommitProgram {
           store_impulses(setup, i);
           return soft_step::has_touched(contacts, i);
         },
-        &d.counters->touching_spheres);
+        &d.counters->touching_spheres, d.contacts_of_part);
     team.for_each_nowait(setup.size() - contacts.sphere_count, [&](std::uint32_t i) {
       store_impulses(setup, contacts.sphere_count + i);
     });
@@ -65,7 +65,7 @@ struct CommitProgram {
       if (begun > 0) atomic_add(&d.counters->begun_points, begun);
     });
     if (bodies.has_blocks &&
-        partition::is_due(steps, bodies.movable_count, d.counters->without_place)) {
+        partition::is_due(steps, bodies.movable_count, d.counters->blocks.without_place)) {
       team.sync();
       if (d.counters->awake > 0) renew_partition(team);
     }
@@ -89,11 +89,14 @@ struct CommitProgram {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
     const auto body = [&](std::uint32_t i) { return bodies.ids[i].index; };
-    team.for_each(bodies.count, [&](std::uint32_t i) {
+    std::uint64_t largest = 0;  // of this thread
+    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
       if (!bodies.movable(body(i))) return;
-      raise(&d.counters->largest_coordinate,
-            std::uint64_t{partition::magnitude_of(bodies.position[body(i)])});
+      const std::uint64_t magnitude = partition::magnitude_of(bodies.position[body(i)]);
+      if (magnitude > largest) largest = magnitude;
     });
+    if (largest > 0) raise(&d.counters->largest_coordinate, largest);
+    team.sync();
     const partition::Grid grid(static_cast<partition::Magnitude>(d.counters->largest_coordinate));
     const SortedCodes& codes = d.codes;
     // Codes have 63 bits, so bodies of mass 0 are last.

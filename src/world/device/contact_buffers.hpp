@@ -43,16 +43,18 @@ class ContactBuffers {
   void keep_velocities(bool keeps) { keeps_velocities_ = keeps; }
   /// Reserves memory for the contacts of the next step, and keeps those of the last step.
   /// @param room number of slots of bodies, as in the last upload
-  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room) {
+  /// @param shared number of contacts that the devices share
+  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room,
+               std::size_t shared) {
     const std::size_t contacts = std::size_t{capacity.spheres} + capacity.candidates;
     const std::size_t kept = std::size_t{sizes_.spheres} + sizes_.manifolds;
-    grow(transfer, &spheres_, capacity.spheres, sizes_.spheres);
+    grow(transfer, &spheres_, capacity.spheres, sizes_.spheres, shared);
     grow(transfer, &manifolds_, capacity.candidates, sizes_.manifolds);
     grow(transfer, &points_, capacity.points, sizes_.points);
     grow(transfer, &impulses_, std::size_t{capacity.spheres} + capacity.points,
-         std::size_t{sizes_.spheres} + sizes_.points);
-    grow(transfer, &rolling_impulses_, contacts, kept);
-    grow(transfer, &colors_, contacts, kept);
+         std::size_t{sizes_.spheres} + sizes_.points, shared);
+    grow(transfer, &rolling_impulses_, contacts, kept, shared);
+    grow(transfer, &colors_, contacts, kept, shared);
     grow(transfer, &touches_, capacity.touches, sizes_.touches);
     transfer.room(&spheres_of_, room);
     transfer.room(&manifolds_of_, room);
@@ -130,10 +132,12 @@ class ContactBuffers {
   /// Makes the capacity of an array at least `count`, and keeps its first items.
   template <class T>
   static void grow(const Transfer<Device>& transfer, Buffer<T>* array, std::size_t count,
-                   std::size_t kept) {
-    if (count <= array->capacity() && array->capacity() > 0) return;
+                   std::size_t kept, std::size_t shared = 0) {
+    count = std::max(count, kept);
+    const PageLayout layout = shared == 0 ? PageLayout{} : PageLayout::of(shared, count);
+    if (transfer.fits(*array, count, layout) && array->capacity() > 0) return;
     Buffer<T> larger;
-    T* const to = transfer.room(&larger, count);
+    T* const to = transfer.room(&larger, count, layout);
     transfer.copy(to, array->data(), kept);
     array->swap(larger);
   }

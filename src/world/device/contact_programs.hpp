@@ -24,19 +24,28 @@ struct BoundsProgram {
     if (d.is_skipped()) return;
     const BodyView& bodies = d.step.bodies;
     if (!is_started) start_counters(team, d);
+    if (bodies.has_blocks) {  // a block of places may be incomplete
+      const std::uint32_t blocks = (bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock;
+      team.for_each_nowait(blocks * kBodiesPerBlock,
+                           [&](std::uint32_t i) { d.body_at[i] = kNone; });
+    }
     team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
     if (bodies.has_blocks && d.world_joints.count > 0) {
       team.for_each_nowait((bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock,
                            [&](std::uint32_t block) { d.first_inner_joint[block] = kNone; });
     }
+    if (d.parts > 1) number_blocks(team);
+    std::uint32_t places = 0;  // of this thread
     team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.is_asleep(body)) d.counters->any_asleep = 1;
-      if (bodies.has_blocks && bodies.movable(body)) put_into_block(body);
+      if (bodies.has_blocks && bodies.movable(body)) put_into_block(body, &places);
     });
+    if (places > 0) raise(&d.counters->blocks.places, places);
     team.for_each_nowait(d.swept_bounds.sub_shapes.ranges.bounded(), [&](std::uint32_t i) {
       d.swept_bounds.sub_shapes.update_pose(bodies, i);
       d.swept_bounds.sweep(i);
+      if (d.parts > 1) d.searched[i] = d.swept_bounds.swept[i];
     });
     if (d.trees.kinematic.block_count > 0) refit(team, d.trees.kinematic);
   }
@@ -58,15 +67,50 @@ struct BoundsProgram {
     }
   }
 
-  JFPX_HD void put_into_block(std::uint32_t body) const {
+  /// Numbers the blocks of places by their first bodies. Arrays by body and arrays by solver index
+  /// then have the same bodies in the same part, as far as bodies that are close to each other have
+  /// close slots.
+  template <class Team>
+  JFPX_HD void number_blocks(const Team& team) const {
+    const StepData& d = data;
+    const BodyView& bodies = d.step.bodies;
+    std::uint32_t places = 0;  // of this thread
+    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies.ids[i].index;
+      if (!bodies.movable(body)) return;
+      const std::uint32_t place = bodies.place[body];
+      if (place == soft_step::kNoPlace) return;
+      if (place >= places) places = place + 1;
+      if (place % kBodiesPerBlock == 0) d.first_of_block[place / kBodiesPerBlock] = body;
+    });
+    if (places > 0) raise(&d.counters->blocks.places, places);
+    team.sync();
+    const std::uint32_t blocks = d.counters->blocks.placed();
+    team.for_each(blocks, [&](std::uint32_t block) {
+      const std::uint32_t first = d.first_of_block[block];
+      std::uint32_t number = 0;
+      for (std::uint32_t other = 0; other < blocks; ++other) {
+        const std::uint32_t it = d.first_of_block[other];
+        if (it < first || (it == first && other < block)) ++number;
+      }
+      d.block_number[block] = number;
+    });
+  }
+
+  /// @param places is raised to the end of the places of the body
+  JFPX_HD void put_into_block(std::uint32_t body, std::uint32_t* places) const {
     const StepData& d = data;
     const std::uint32_t place = d.step.bodies.place[body];
     if (place == soft_step::kNoPlace) {
-      d.unplaced[atomic_add(&d.counters->without_place, 1)] = body;
+      d.unplaced[atomic_add(&d.counters->blocks.without_place, 1)] = body;
     } else {
-      d.body_at[place] = body;
-      d.solver_index[body] = place;
-      raise(&d.counters->places, place + 1);
+      std::uint32_t index = place;
+      if (d.parts > 1) {
+        index = d.block_number[place / kBodiesPerBlock] * kBodiesPerBlock + place % kBodiesPerBlock;
+      }
+      d.body_at[index] = body;
+      d.solver_index[body] = index;
+      if (place >= *places) *places = place + 1;
     }
   }
 
@@ -77,7 +121,8 @@ struct BoundsProgram {
     d.first_candidate[body] = kNone;
     d.manifold_sizes[body] = 0;
     d.used_colors[body] = {};
-    if (d.step.bodies.has_blocks) d.body_at[body] = kNone;
+    if (d.parts > 1 && body % kBodiesPerBlock == 0)
+      d.first_of_block[body / kBodiesPerBlock] = kNone;
     d.first_order[body] = ~std::uint64_t{0};
     d.first_contact[body] = kNone;
     d.constrained[body] = 0;
@@ -102,6 +147,7 @@ struct SphereProgram {
       team.once([&] {
         d.counters->failed = 1;
         d.counters->needed.pairs = d.pair_count->contacts;
+        d.counters->pairs = static_cast<std::uint32_t>(d.pair_count->contacts);
       });
       return;
     }
@@ -109,8 +155,9 @@ struct SphereProgram {
     if (ranges.fixed_begin() < ranges.all()) {
       team.for_each_nowait(ranges.fixed_begin(), [&](std::uint32_t i) { find_fixed(i); });
     }
+    const auto pairs = static_cast<std::uint32_t>(d.pair_count->contacts);
     const std::uint32_t found = team.scan(
-        static_cast<std::uint32_t>(d.pair_count->contacts),
+        pairs,
         [&](std::uint32_t i) {
           d.pair_found[i] = test(i) ? 1 : 0;
           return std::uint32_t{d.pair_found[i]};
@@ -122,9 +169,11 @@ struct SphereProgram {
                               b = bodies[d.pairs[i].b];
           const NormalDistance result = d.pair_results[i];
           d.now().view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
-        });
+        },
+        d.pairs_of_part);
     team.once([&] {
       Counters& c = *d.counters;
+      c.pairs = pairs;
       c.spheres = c.needed.spheres = found;
       c.needed.candidates = c.candidates;
       if (found > d.capacity.spheres || c.candidates > d.capacity.candidates) c.failed = 1;

@@ -32,16 +32,20 @@ namespace device {
 inline constexpr int kMarks = 4;
 
 /// @tparam Device owns a stream of work, or emulates one on the host:
-///   - `number()`, `stream()`: see cuda::DeviceStates;
-///   - `Buffer<T>`: array in the memory of the device; data(), capacity();
-///   - `reserve(&buffer, count, what)`, `reserve_exactly(&buffer, count, what)`: makes the capacity
-///     at least `count`, with and without slack, and discards the contents; `release_unused()`:
-///     gives memory of smaller buffers back;
+///   - `number()`, `stream()`: see cuda::DeviceStates; `parts()`: largest StepData::parts;
+///     `use_parts(parts)`: selects whether all devices share memory that is reserved later;
+///   - `Buffer<T>`: array in the memory of the device; data(), capacity(), swap();
+///   - `reserve(&buffer, count, what, layout)`, `reserve_exactly(&buffer, count, what, layout)`:
+///   make
+///     the capacity at least `count`, with and without slack, and discard the contents if the
+///     buffer does not fit; `fits(buffer, count, layout)`; `release_unused()`: gives memory of
+///     smaller buffers back;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
 ///   - `fetch(copies, pool)`: performs HostCopies, and waits;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: see cuda::DeviceSphereCollider, after
 ///     `reserve_pairs(n, capacity)`;
-///   - `run(program, items)`: runs program(team) with about one thread per item;
+///   - `run(program, items, parts)`: runs program(team) with about one thread per item, on one
+///     device or on all;
 ///   - `wait()`: waits for all work; `wait_for_graphs()`: waits for all launched graphs;
 ///   - `fork(stream)`: later work of this object waits for earlier work of `stream`;
 ///     `join(stream)`: later work of `stream` waits for earlier work of this object;
@@ -70,6 +74,7 @@ class DeviceStep final : public DeviceWorld {
     if (bodies.capacity() > room_) {
       room_ = room_ == 0 ? bodies.capacity() : bodies.capacity() + bodies.capacity() / 2;
     }
+    device_->use_parts(bodies.has_blocks() ? device_->parts() : 1);
     bodies_.upload(transfer_, bodies, room_, &data_);
     scratch_.reserve_bodies(transfer_, room_, &data_);
     hulls_.clear();
@@ -91,7 +96,7 @@ class DeviceStep final : public DeviceWorld {
   }
 
   void upload_joints(JointStore* joints) override {
-    joints_.upload(transfer_, joints->view(), 1 - now(), room_, &data_);
+    joints_.upload(transfer_, joints->view(), 1 - now(), room_, device_->parts(), &data_);
     load_solver();
     is_ready_ = false;
     ++changes_;
@@ -200,6 +205,9 @@ class DeviceStep final : public DeviceWorld {
 
   bool capture(const ForceTable* forces, std::uint64_t steps, std::uint32_t count,
                cuda::Stream stream) override {
+    if (device_->parts() > 1) {
+      throw InvalidArgument("stream is being captured; the world must then have one device");
+    }
     if (!has_stepped_ || !is_prepared(forces, steps)) return false;
     select_forces(forces);
     is_queued_ = true;
@@ -403,13 +411,32 @@ class DeviceStep final : public DeviceWorld {
   /// Reserves memory, so that the step allocates nothing.
   void make_room() {
     if (is_ready_) return;
+    data_.parts = data_.step.bodies.has_blocks ? device_->parts() : 1;
+    device_->use_parts(data_.parts);
+    divide(pairs_, 1024, &data_.pairs_of_part);
+    divide(last_contacts().sizes().spheres, 1024, &data_.contacts_of_part);
+    divide(data_.step.bodies.movable_count / kBodiesPerBlock, 1, &data_.blocks_of_part);
     const std::uint64_t moves = transfer_.moves();
     scratch_.reserve_lists(transfer_, capacity_, &data_);
-    for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
+    const std::size_t shared = std::size_t{data_.parts} * data_.contacts_of_part;
+    for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_, shared);
     use_contacts();
     device_->reserve_pairs(data_.swept_bounds.sub_shapes.ranges.fixed_begin(), capacity_.pairs);
     if (transfer_.moves() != moves) device_->release_unused();
     is_ready_ = true;
+  }
+
+  /// Divides n items among the parts, unless the division for an earlier number is good enough:
+  /// arrays are moved when it changes. @param each see range_of_part()
+  void divide(std::uint32_t n, std::uint32_t most_difference, std::uint32_t* each) const {
+    if (*each > 0 && is_divided(n, most_difference, *each)) return;
+    *each = std::max((n + data_.parts - 1) / data_.parts, std::uint32_t{1});
+  }
+  bool is_divided(std::uint32_t n, std::uint32_t most_difference, std::uint32_t each) const {
+    constexpr std::uint64_t kDivisor = 16;  // most_difference, or a sixteenth
+    const std::uint64_t divided = std::uint64_t{data_.parts} * each;
+    const std::uint64_t difference = n > divided ? n - divided : divided - n;
+    return data_.parts == 1 || difference <= std::max(n / kDivisor, std::uint64_t{most_difference});
   }
 
   /// @param is_timed whether to mark the stages
@@ -422,39 +449,43 @@ class DeviceStep final : public DeviceWorld {
     const std::size_t bodies = d.step.bodies.count;
     const std::size_t sub_shapes = d.swept_bounds.sub_shapes.ranges.bounded();
     const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
+    const auto run = [&](const auto& program, std::size_t items) {
+      device_->run(program, items, d.parts);
+    };
     const auto mark = [&](int i) {
       if (is_timed) device_->mark(i);
     };
     const bool forces_act = force_sum_ != nullptr;
     if (forces_act) {
       mark(0);
-      device_->run(ForceProgram{d, forces_.view(), force_sum_, torque_sum_}, bodies);
+      run(ForceProgram{d, forces_.view(), force_sum_, torque_sum_}, bodies);
     }
     mark(1);
-    device_->run(BoundsProgram{d, forces_act}, std::max(bodies, sub_shapes));
-    device_->find_pairs(d.swept_bounds.swept, d.swept_bounds.sub_shapes.ranges.fixed_begin(),
-                        d.pairs, capacity_.pairs, d.pair_count);
-    device_->run(SphereProgram{d}, contacts);
-    device_->run(ShapeProgram{d}, contacts);
-    device_->run(MatchProgram{d}, contacts);
+    run(BoundsProgram{d, forces_act}, std::max(bodies, sub_shapes));
+    device_->find_pairs(d.parts > 1 ? d.searched : d.swept_bounds.swept,
+                        d.swept_bounds.sub_shapes.ranges.fixed_begin(), d.pairs, capacity_.pairs,
+                        d.pair_count);
+    run(SphereProgram{d}, contacts);
+    run(ShapeProgram{d}, contacts);
+    run(MatchProgram{d}, contacts);
     mark(2);
-    device_->run(PrepareProgram{d}, contacts);
+    run(PrepareProgram{d}, contacts);
     const bool has_joints = d.world_joints.count > 0;
     // More threads than rows: rows of manifolds need the caches of several multiprocessors.
     const std::size_t rows = std::max<std::size_t>(contacts, 4 * std::size_t{last.manifolds});
     if (d.step.bodies.has_blocks) {
       if (has_joints) {
-        device_->run(BlockSolveProgram<soft_step::kRowKinds>{d}, contacts);
+        run(BlockSolveProgram<soft_step::kRowKinds>{d}, contacts);
       } else {  // one of them returns at once
-        device_->run(BlockSolveProgram<kSphereRowKinds>{d}, contacts);
-        device_->run(BlockSolveProgram<soft_step::kContactRowKinds>{d}, contacts);
+        run(BlockSolveProgram<kSphereRowKinds>{d}, contacts);
+        run(BlockSolveProgram<soft_step::kContactRowKinds>{d}, contacts);
       }
     } else if (has_joints) {
-      device_->run(SolveProgram<soft_step::kRowKinds>{d}, rows);
+      run(SolveProgram<soft_step::kRowKinds>{d}, rows);
     } else {
-      device_->run(SolveProgram<soft_step::kContactRowKinds>{d}, rows);
+      run(SolveProgram<soft_step::kContactRowKinds>{d}, rows);
     }
-    device_->run(CommitProgram{d}, contacts);
+    run(CommitProgram{d}, contacts);
     mark(3);
   }
 
@@ -462,6 +493,7 @@ class DeviceStep final : public DeviceWorld {
     Counters result;
     device_->download(&result, data_.counters, 1);
     device_->wait();
+    if (result.pairs > 0) pairs_ = result.pairs;
     return result;
   }
 
@@ -481,6 +513,10 @@ class DeviceStep final : public DeviceWorld {
       if (known_.completed + 2 < progress.completed) continue;
       contacts_[now()].complete(progress.contacts[now()], data_.step.bodies.capacity);
       has_stepped_ = true;
+    }
+    if (!is_divided(last_contacts().sizes().spheres, 1024, data_.contacts_of_part) ||
+        !is_divided(pairs_, 1024, data_.pairs_of_part)) {
+      is_ready_ = false;
     }
   }
 
@@ -537,6 +573,7 @@ class DeviceStep final : public DeviceWorld {
   std::uint64_t deferred_ = 0;       ///< for finish(), if one of its calls fails
   std::uint64_t changes_ = 0;        ///< counts changes of program arguments, except addresses
   std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
+  std::uint32_t pairs_ = 0;          ///< of swept bounds, in the last step
   bool has_stepped_ = false;         ///< whether a step was completed since the upload
   bool is_queued_ = false;           ///< whether the host has enqueued or captured steps
   bool is_ready_ = false;            ///< whether all lists have the room of capacity_

@@ -11,11 +11,12 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 
 #if JFPX_HAS_CUDA
-std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene, int device) {
-  return cuda::make_world(scene, device);
+std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene,
+                                               const std::vector<int>& devices) {
+  return cuda::make_world(scene, devices);
 }
 #else
-std::unique_ptr<DeviceWorld> make_device_world(const Scene&, int) {
+std::unique_ptr<DeviceWorld> make_device_world(const Scene&, const std::vector<int>&) {
   throw BackendUnavailable("cuda: built without CUDA");
 }
 #endif

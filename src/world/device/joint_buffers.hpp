@@ -18,8 +18,9 @@ class JointBuffers {
   /// Replaces the joints by those of the host. Waits for the copies.
   /// @param last index in DeviceJoints::kept of the impulses of the last step
   /// @param room number of slots of bodies to reserve memory for
+  /// @param parts largest StepData::parts of a step
   void upload(const Transfer<Device>& transfer, const soft_step::JointView& from,
-              std::uint64_t last, std::size_t room, StepData* data) {
+              std::uint64_t last, std::size_t room, std::size_t parts, StepData* data) {
     DeviceJoints& to = data->world_joints;
     to.count = from.count;
     to.inputs = transfer.put(&inputs_, from.inputs, from.count);
@@ -35,8 +36,8 @@ class JointBuffers {
         const soft_step::RowKind kind = soft_step::kind_of_joint(from.inputs[joint].type);
         ++to.of_kind[kind - soft_step::kContactRowKinds];
       }
-      data->distance_rows = transfer.room_to_grow(&distance_rows_, to.of_kind[0]);
-      data->frame_rows = transfer.room_to_grow(&frame_rows_, to.of_kind[1]);
+      data->distance_rows = transfer.room_to_grow(&distance_rows_, parts * to.of_kind[0]);
+      data->frame_rows = transfer.room_to_grow(&frame_rows_, parts * to.of_kind[1]);
     }
     transfer.wait();
   }

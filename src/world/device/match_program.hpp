@@ -23,7 +23,7 @@ struct MatchProgram {
     if (data.has_failed()) return;
     const StepData& d = data;
     const std::uint32_t spheres = d.counters->spheres;
-    team.for_each(spheres + d.counters->manifolds, [&](std::uint32_t i) {
+    const auto match = [&](std::uint32_t i) {
       const std::uint8_t before = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
       const soft_step::ContactView now = d.contacts();
       const soft_step::ContactKey& key = now.key(i);
@@ -38,7 +38,8 @@ struct MatchProgram {
         now.colors[i] = soft_step::kNoColor;
         d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = i;
       }
-    });
+    };
+    team.for_each(spheres + d.counters->manifolds, match, d.contacts_of_part);
     if (d.world_joints.count > 0) {
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) { match_joint(joint); });
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) {

@@ -32,15 +32,14 @@ struct PrepareProgram {
     if (d.counters->any_asleep != 0) d.islands().wake_touched(team);
     if (bodies.has_blocks) {
       if (!has_indices(team)) return;
-      const std::uint32_t first = d.first_without_place();
-      team.for_each_nowait(first - d.counters->places,
-                           [&](std::uint32_t i) { d.body_at[d.counters->places + i] = kNone; });
-      team.for_each_nowait(d.counters->without_place, [&](std::uint32_t i) {
+      const BlockCounts blocks = d.counters->blocks;
+      const std::uint32_t first = blocks.first_without_place();
+      team.for_each_nowait(blocks.without_place, [&](std::uint32_t i) {
         d.body_at[first + i] = d.unplaced[i];
         d.solver_index[d.unplaced[i]] = first + i;
       });
       team.for_each(bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); });
-      team.for_each(d.index_count(), [&](std::uint32_t i) { start(d.body_at[i], i); });
+      team.for_each(blocks.indices(), [&](std::uint32_t i) { start(d.body_at[i], i); });
     } else {
       team.for_each(bodies.count, [&](std::uint32_t i) {
         const std::uint32_t body = bodies.ids[i].index;
@@ -50,17 +49,18 @@ struct PrepareProgram {
     }
     place_rows(team);
     place_points(team);
-    if (bodies.has_blocks) {
-      place_inner_rows(team);
-      team.sync();  // has_room() reads the numbers of rows of all blocks
-    }
+    if (bodies.has_blocks) place_inner_rows(team);
+    team.sync();  // has_room() reads the numbers of rows of all blocks
     if (!has_room(team)) return;
     sort_overflow(team);
     team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.movable(body)) sort_fixed(d.index_of(body));
     });
-    team.for_each_nowait(row_count(), [&](std::uint32_t r) { fill_row(r); });
+    const RowBins& rows = d.bins[team.part()];
+    team.team_of_part().for_each_nowait(rows.begin[kBins] - rows.begin[0], [&](std::uint32_t i) {
+      fill_row(rows, rows.begin[0] + i);
+    });
   }
 
  private:
@@ -96,13 +96,13 @@ struct PrepareProgram {
     }
   }
 
-  /// Assigns a row to each contact and joint, sorted by bin, except those with inner rows.
+  /// Assigns a row to each contact and joint, sorted by part and bin, except those with inner rows.
   template <class Team>
   JFPX_HD void place_rows(const Team& team) const {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();
     team.partition(
-        setup.size(), d.row_bins, d.counters->bin_begin,
+        setup.size(), d.row_bins, d.bin_sizes, d.bins, d.row_capacity,
         [&](std::uint32_t i) -> std::uint16_t {
           const std::uint32_t color = setup.color_of(i);
           if (d.step.bodies.has_blocks && soft_step::is_inner_color(color)) {
@@ -114,7 +114,16 @@ struct PrepareProgram {
                      ? soft_step::kNoBin
                      : soft_step::bin_of(kind, soft_step::RowSetup::group_of(color));
         },
+        [&](std::uint32_t i, std::uint16_t bin) -> std::uint32_t {
+          const std::uint32_t group = bin % soft_step::kGroups;
+          if (group == soft_step::kOverflowGroup) return 0;
+          const soft_step::ContactKey key = setup.key(i);
+          const std::uint32_t body =
+              group == soft_step::kFixedGroup ? setup.movable_body(key) : key.a;
+          return part_of(d.index_of(body) / kBodiesPerBlock, d.parts, d.blocks_of_part);
+        },
         [&](std::uint32_t i, std::uint32_t row, std::uint16_t bin) {
+          if (!has_memory(row)) return;
           d.row_contact[row] = i;
           const soft_step::ContactKey key = setup.key(i);
           const std::uint32_t group = bin % soft_step::kGroups;
@@ -125,32 +134,58 @@ struct PrepareProgram {
             atomic_or(&d.row_bodies[d.index_of(key.a)].colors, bit);
             atomic_or(&d.row_bodies[d.index_of(key.b)].colors, bit);
           }
-        });
+        },
+        d.contacts_of_part);
+    team.for_each_nowait(d.parts * kBins, [&](std::uint32_t i) { note_bin(i / kBins, i % kBins); });
   }
+
+  /// Completes RowBins for a bin.
+  JFPX_HD void note_bin(std::uint32_t part, std::uint32_t bin) const {
+    const StepData& d = data;
+    RowBins& bins = d.bins[part];
+    const std::uint32_t group = bin % soft_step::kGroups;
+    if (group == 0) {
+      const auto kind = static_cast<soft_step::RowKind>(bin / soft_step::kGroups);
+      bins.first[kind] = bins.begin[bin] - part * d.capacity_of(kind);
+    }
+    const std::uint32_t first_color = soft_step::group_of_crossing(0);
+    if (group < first_color || group >= soft_step::kFixedGroup) return;
+    if (bins.begin[bin] < bins.begin[bin + 1]) {
+      raise(&d.counters->crossing_colors, group - first_color + 1);
+    }
+  }
+
+  /// Whether a row has memory. If the rows of a part do not fit, they may be among those of the
+  /// next part, or have no memory; has_room() then ends the step.
+  JFPX_HD bool has_memory(std::uint32_t row) const { return row < data.parts * data.row_capacity; }
 
   /// Assigns points to the rows of manifolds, except inner rows.
   template <class Team>
   JFPX_HD void place_points(const Team& team) const {
     const StepData& d = data;
-    const std::uint32_t rows = size<soft_step::ManifoldRow>();
-    if (rows == 0) return;
+    std::uint32_t all_rows = 0;
+    for (std::uint32_t part = 0; part < d.parts; ++part) all_rows += manifolds_of(part);
+    if (all_rows == 0) return;
     const soft_step::ContactView contacts = d.contacts();
-    const std::uint32_t first_row = first<soft_step::ManifoldRow>();
+    const std::uint32_t part = team.part(), rows = manifolds_of(part);
+    const std::uint32_t first_row = d.bins[part].begin[soft_step::bin_of(kManifold, 0)];
     const auto size = [&](std::uint32_t r) {
-      return contacts.impulse_count(d.row_contact[first_row + r]);
+      const std::uint32_t row = first_row + r;
+      return has_memory(row) ? contacts.impulse_count(d.row_contact[row]) : 0;
     };
+    const std::uint32_t capacity = d.capacity.manifold_rows;
     const std::uint32_t points =
-        team.scan(rows, size, size, [&](std::uint32_t r, std::uint32_t first) {
-          if (r < d.capacity.manifold_rows) d.manifold_rows[r].first = first;
+        team.team_of_part().scan(rows, size, size, [&](std::uint32_t r, std::uint32_t first) {
+          if (r >= capacity) return;
+          d.manifold_rows[part * capacity + r].first = part * d.capacity.row_points + first;
         });
-    team.once([&] { d.counters->points_of_rows = points; });
-    team.sync();
+    team.team_of_part().once([&] { d.counters->parts[part].points_of_rows = points; });
   }
 
   JFPX_HD void add_inner_joint(const soft_step::RowSetup& setup, std::uint32_t i) const {
     const StepData& d = data;
     if (setup.kind_of(i) == soft_step::kNoRow) return;
-    const std::uint32_t block = soft_step::block_of(d.step.bodies.place[setup.key(i).a]);
+    const std::uint32_t block = d.index_of(setup.key(i).a) / kBodiesPerBlock;
     prepend(&d.first_inner_joint[block], d.next_inner_joint, setup.joint_of(i));
   }
 
@@ -159,14 +194,17 @@ struct PrepareProgram {
   template <class Team>
   JFPX_HD void place_inner_rows(const Team& team) const {
     const soft_step::RowSetup setup = data.row_setup();
-    team.for_blocks(data.placed_blocks(), [&](std::uint32_t block, const auto& threads) {
+    const BlockCounts blocks = data.counters->blocks;
+    const std::uint32_t placed = blocks.placed();
+    const auto place = [&](std::uint32_t block, const auto& threads) {
+      if (block >= placed) return;  // all rows of the bodies are crossing rows
       auto* rows = static_cast<BlockRows*>(threads.shared(kSharedBytes));
       constexpr std::uint32_t kCells = soft_step::kRowKinds * soft_step::kColorsPerClass;
       threads.for_each(kCells, [&](std::uint32_t i) {
         rows->next[i / soft_step::kColorsPerClass][i % soft_step::kColorsPerClass] = 0;
       });
       threads.once([&] { rows->points = 0; });
-      const Range places = data.places_of(block);
+      const Range places = blocks.indices_of(block);
       threads.for_each(places.end - places.begin,
                        [&](std::uint32_t i) { rows->spheres[i] = data.sphere(places.begin + i); });
       threads.sync();
@@ -178,7 +216,7 @@ struct PrepareProgram {
                            }
                          });
       threads.sync();
-      threads.once([&] { allocate_inner_rows(block, rows); });
+      threads.once([&] { allocate_inner_rows(team.part(), block, rows); });
       threads.sync();
       for_inner_contacts(threads, setup, block,
                          [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
@@ -188,20 +226,18 @@ struct PrepareProgram {
                          });
       threads.sync();
       fill_inner_rows(threads, setup, block, rows, soft_step::RowTypes());
-    });
+    };
+    team.for_blocks(blocks.all(), place, data.blocks_of_part);
   }
 
+  static constexpr soft_step::RowKind kSphere = soft_step::kKindOf<soft_step::SphereRow>;
   static constexpr soft_step::RowKind kManifold = soft_step::kKindOf<soft_step::ManifoldRow>;
 
-  JFPX_HD void allocate_inner_rows(std::uint32_t block, BlockRows* rows) const {
+  JFPX_HD void allocate_inner_rows(std::uint32_t part, std::uint32_t block, BlockRows* rows) const {
     const StepData& d = data;
+    PartCounters& counters = d.counters->parts[part];
     const std::uint32_t points_end =
-        rows->points + atomic_add(&d.counters->inner_points, rows->points);
-    std::uint32_t capacity[soft_step::kRowKinds] = {d.sphere_row_capacity,
-                                                    d.capacity.manifold_rows};
-    for (std::uint32_t kind = soft_step::kContactRowKinds; kind < soft_step::kRowKinds; ++kind) {
-      capacity[kind] = d.world_joints.of_kind[kind - soft_step::kContactRowKinds];
-    }
+        rows->points + atomic_add(&counters.inner_points, rows->points);
     for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
       std::uint32_t* const next = rows->next[kind];
       std::uint32_t count = 0;
@@ -209,10 +245,11 @@ struct PrepareProgram {
         count += next[color];
       }
       const std::uint32_t end =
-          count + (count > 0 ? atomic_add(&d.counters->inner_rows[kind], count) : 0);
+          count + (count > 0 ? atomic_add(&counters.inner_rows[kind], count) : 0);
+      const std::uint32_t capacity = d.capacity_of(kind);
       rows->has_room[kind] =
-          end <= capacity[kind] && (kind != kManifold || points_end <= d.capacity.row_points);
-      std::uint32_t begin = capacity[kind] - end;
+          end <= capacity && (kind != kManifold || points_end <= d.capacity.row_points);
+      std::uint32_t begin = (part + 1) * capacity - end;
       std::uint32_t* const begins = d.inner_begin(block, kind);
       for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
         begins[color] = begin;
@@ -222,7 +259,7 @@ struct PrepareProgram {
       }
       begins[soft_step::kColorsPerClass] = begin;
     }
-    rows->points = d.capacity.row_points - points_end;
+    rows->points = (part + 1) * d.capacity.row_points - points_end;
   }
 
   /// Calls f(contact, kind, color) for the contacts and joints with inner rows in a block.
@@ -230,7 +267,7 @@ struct PrepareProgram {
   JFPX_HD void for_inner_contacts(const Threads& threads, const soft_step::RowSetup& setup,
                                   std::uint32_t block, const F& f) const {
     const StepData& d = data;
-    const Range places = d.places_of(block);
+    const Range places = d.counters->blocks.indices_of(block);
     const auto visit = [&](std::uint32_t i) {
       const std::uint32_t color = setup.color_of(i);
       if (!soft_step::is_inner_color(color)) return;
@@ -311,34 +348,55 @@ struct PrepareProgram {
   template <class Team>
   JFPX_HD bool has_indices(const Team& team) const {
     const StepData& d = data;
-    if (d.index_count() <= d.capacity.indices) return true;
+    const std::uint32_t indices = d.counters->blocks.indices();
+    if (indices <= d.capacity.indices) return true;
     team.once([&] {
-      d.counters->needed.indices = d.index_count();
+      d.counters->needed.indices = indices;
       d.counters->failed = 1;
     });
     return false;
   }
 
-  /// @returns whether the rows of manifolds and their points fit into memory
+  /// @returns whether the rows of each part and their points fit into memory
   template <class Team>
   JFPX_HD bool has_room(const Team& team) const {
     const StepData& d = data;
-    const std::uint32_t rows = size<soft_step::ManifoldRow>() + d.counters->inner_rows[kManifold];
-    const std::uint32_t points = d.counters->points_of_rows + d.counters->inner_points;
-    if (rows <= d.capacity.manifold_rows && points <= d.capacity.row_points) return true;
+    std::uint32_t all = 0, manifolds = 0, points = 0, rows = 0;
+    for (std::uint32_t part = 0; part < d.parts; ++part) {
+      const PartCounters& counters = d.counters->parts[part];
+      const std::uint32_t* begin = d.bins[part].begin;
+      const std::uint32_t of_part = manifolds_of(part) + counters.inner_rows[kManifold];
+      all += of_part;
+      manifolds = larger(manifolds, of_part);
+      points = larger(points, counters.points_of_rows + counters.inner_points);
+      rows = larger(rows, begin[kBins] - begin[0] + counters.inner_rows[kSphere]);
+    }
+    team.once([&] { d.counters->manifold_rows = all; });
+    team.team_of_part().once([&] {
+      RowBins& bins = d.bins[team.part()];
+      bins.crossing_colors = d.counters->crossing_colors;
+      bins.blocks = d.counters->blocks;
+    });
+    if (manifolds <= d.capacity.manifold_rows && points <= d.capacity.row_points &&
+        rows <= d.row_capacity) {
+      return true;
+    }
     team.once([&] {
-      d.counters->needed.manifold_rows = rows;
-      d.counters->needed.row_points = points;
+      Capacity& needed = d.counters->needed;
+      needed.manifold_rows = manifolds;
+      needed.row_points = points;
+      needed.rows = rows;
       d.counters->failed = 1;
     });
     return false;
   }
+  JFPX_HD static std::uint32_t larger(std::uint32_t a, std::uint32_t b) { return a > b ? a : b; }
 
   /// Sorts the overflow rows by kind, then by their contacts.
   template <class Team>
   JFPX_HD void sort_overflow(const Team& team) const {
     const StepData& d = data;
-    const std::uint32_t* begin = d.counters->bin_begin;
+    const std::uint32_t* begin = d.bins->begin;  // of the first part
     std::uint32_t before = 0;
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
       const std::uint32_t bin = soft_step::bin_of(kind, soft_step::kOverflowGroup);
@@ -365,19 +423,20 @@ struct PrepareProgram {
                   [&](std::uint32_t x, std::uint32_t y) { return order(x) < order(y); });
   }
 
-  JFPX_HD void fill_row(std::uint32_t r) const {
-    soft_step::visit_row(soft_step::kind_of_row(data.counters->bin_begin, r),
-                         [&](auto type) { fill<typename decltype(type)::type>(r); });
+  /// @param bins of the part of the row
+  JFPX_HD void fill_row(const RowBins& bins, std::uint32_t r) const {
+    soft_step::visit_row(soft_step::kind_of_row(bins.begin, r),
+                         [&](auto type) { fill<typename decltype(type)::type>(bins, r); });
   }
   template <class Row>
-  JFPX_HD void fill(std::uint32_t r) const {
+  JFPX_HD void fill(const RowBins& bins, std::uint32_t r) const {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();
     const std::uint32_t contact = d.row_contact[r];
     constexpr soft_step::RowKind kKind = soft_step::kKindOf<Row>;
-    const bool is_fixed =
-        r >= d.counters->bin_begin[soft_step::bin_of(kKind, soft_step::kFixedGroup)];
-    d.row_of[contact] = r - first<Row>();
+    const bool is_fixed = r >= bins.begin[soft_step::bin_of(kKind, soft_step::kFixedGroup)];
+    const std::uint32_t number = r - bins.first[kKind];
+    d.row_of[contact] = number;
     if constexpr (std::is_same_v<Row, soft_step::SphereRow>) {
       const soft_step::ContactKey& key = setup.contacts.key(contact);
       const bool flipped = setup.is_flipped(key);
@@ -391,9 +450,9 @@ struct PrepareProgram {
         row.b = d.index_of(b);
         setup.fill<false>(&row, contact, flipped, d.sphere(row.a), d.sphere(row.b));
       }
-      d.sphere_rows.store(r, row);
+      d.sphere_rows.store(number, row);
     } else {
-      Row* row = &d.rows<Row>()[r - first<Row>()];
+      Row* row = &d.rows<Row>()[number];
       typename Row::Part* parts = d.parts_of(*row);
       is_fixed ? setup.fill<true>(row, parts, contact) : setup.fill<false>(row, parts, contact);
       if constexpr (std::is_same_v<Row, soft_step::ManifoldRow>) {
@@ -404,17 +463,10 @@ struct PrepareProgram {
     }
   }
 
-  JFPX_HD std::uint32_t row_count() const { return data.counters->bin_begin[kBins]; }
-  /// First row of a kind.
-  template <class Row>
-  JFPX_HD std::uint32_t first() const {
-    return data.counters->bin_begin[soft_step::bin_of(soft_step::kKindOf<Row>, 0)];
-  }
-  /// Number of rows of a kind.
-  template <class Row>
-  JFPX_HD std::uint32_t size() const {
-    return data.counters->bin_begin[soft_step::bin_of(soft_step::kKindOf<Row> + 1u, 0)] -
-           first<Row>();
+  /// Number of the rows of manifolds of a part, except inner rows.
+  JFPX_HD std::uint32_t manifolds_of(std::uint32_t part) const {
+    const std::uint32_t* begin = data.bins[part].begin;
+    return begin[soft_step::bin_of(kManifold + 1u, 0)] - begin[soft_step::bin_of(kManifold, 0)];
   }
 };
 

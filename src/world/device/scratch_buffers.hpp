@@ -52,6 +52,9 @@ class ScratchBuffers {
     const std::size_t boxes = ranges.fixed_begin() - ranges.spheres();
     data->swept_bounds.margins = transfer.room_to_grow(&margins_, ranges.bounded());
     data->swept_bounds.swept = transfer.room_to_grow(&swept_, ranges.bounded());
+    if (transfer.parts() > 1) {
+      data->searched = transfer.room_to_grow(&searched_, ranges.bounded(), kOfSearch);
+    }
     data->swept_bounds.boxes = transfer.room_to_grow(&boxes_, boxes);
   }
 
@@ -61,37 +64,47 @@ class ScratchBuffers {
     Capacity& c = d.capacity = capacity;
     c.indices = static_cast<std::uint32_t>(
         may_have_blocks_ ? std::max(std::size_t{capacity.indices}, usual_index_count()) : slots_);
-    reserve_solver(transfer, c.indices, data);
+    const std::size_t shared = std::size_t{d.parts} * d.blocks_of_part * kBodiesPerBlock;
+    reserve_solver(transfer, c.indices, PageLayout::of(shared, c.indices).used, data);
     const std::size_t contacts = std::size_t{c.spheres} + c.candidates;
-    const std::size_t rows = contacts + d.world_joints.count;
-    d.pairs = transfer.room(&pairs_, c.pairs);
-    d.pair_found = transfer.room(&pair_found_, c.pairs);
-    d.pair_results = transfer.room(&pair_results_, c.pairs);
+    const std::size_t all_rows = contacts + d.world_joints.count;
+    const std::size_t rows_of_part =
+        d.parts == 1 ? all_rows : std::max<std::size_t>(c.rows, all_rows / d.parts * 9 / 8 + 64);
+    const std::size_t rows = d.parts * rows_of_part;
+    d.row_capacity = static_cast<std::uint32_t>(rows_of_part);
+    const std::size_t shared_contacts = std::size_t{d.parts} * d.contacts_of_part;
+    const PageLayout by_contact = PageLayout::of(shared_contacts, all_rows);
+    const PageLayout by_pair = PageLayout::of(std::size_t{d.parts} * d.pairs_of_part, c.pairs);
+    d.pairs = transfer.room(&pairs_, c.pairs, by_pair);
+    d.pair_found = transfer.room(&pair_found_, c.pairs, by_pair);
+    d.pair_results = transfer.room(&pair_results_, c.pairs, by_pair);
     d.candidates = transfer.room(&candidates_, c.candidates);
     d.tested = transfer.room(&tested_, c.candidates);
     d.next_candidate = transfer.room(&next_candidate_, c.candidates);
-    d.uncolored = transfer.room(&uncolored_, rows);
-    d.still_uncolored = transfer.room(&still_uncolored_, rows);
+    d.uncolored = transfer.room(&uncolored_, all_rows, by_contact);
+    d.still_uncolored = transfer.room(&still_uncolored_, all_rows);
     d.row_of = d.uncolored;
-    d.row_bins = transfer.room(&row_bins_, rows);
+    d.row_bins = transfer.room(&row_bins_, all_rows, by_contact);
+    d.bin_sizes = transfer.room(&bin_sizes_, kMostParts * (kBins + 1));
+    d.bins = transfer.room(&bins_, kMostParts);
     d.row_contact = transfer.room(&row_contact_, rows);
     d.next_fixed = transfer.room(&next_fixed_, rows);
     d.next_inner_joint = transfer.room(&next_inner_joint_, d.world_joints.count);
-    d.overflow = transfer.room(&overflow_, rows);
-    d.sphere_rows = {transfer.room(&sphere_rows_, contacts), contacts};
-    d.sphere_row_capacity = static_cast<std::uint32_t>(contacts);
+    d.overflow = transfer.room(&overflow_, all_rows);
+    d.sphere_rows = {transfer.room(&sphere_rows_, rows, columns_of<soft_step::SphereRow>()), rows};
     if (may_have_blocks_) {
-      std::size_t capacities[soft_step::kRowKinds] = {contacts, c.manifold_rows};
-      std::copy(std::begin(d.world_joints.of_kind), std::end(d.world_joints.of_kind),
-                capacities + soft_step::kContactRowKinds);
-      std::uint32_t* next = transfer.room(&inner_contacts_, rows + c.manifold_rows);
-      for (std::size_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
+      std::size_t count = 0;
+      for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
+        count += d.parts * std::size_t{d.capacity_of(kind)};
+      }
+      std::uint32_t* next = transfer.room(&inner_contacts_, count);
+      for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
         d.inner_contacts[kind] = next;
-        next += capacities[kind];
+        next += d.parts * std::size_t{d.capacity_of(kind)};
       }
     }
-    d.manifold_rows = transfer.room(&manifold_rows_, c.manifold_rows);
-    d.point_rows = transfer.room(&point_rows_, c.row_points);
+    d.manifold_rows = transfer.room(&manifold_rows_, d.parts * std::size_t{c.manifold_rows});
+    d.point_rows = transfer.room(&point_rows_, d.parts * std::size_t{c.row_points});
   }
 
  private:
@@ -102,17 +115,33 @@ class ScratchBuffers {
   }
 
   /// Reserves the arrays by solver index. @param n number of indices
-  void reserve_solver(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
+  /// @param used fraction of them that bodies have
+  void reserve_solver(const Transfer<Device>& transfer, std::size_t n, double used,
+                      StepData* data) {
     StepData& d = *data;
-    d.columns = {transfer.room(&cells_, n * CellColumns::kColumns), n};
-    d.row_bodies = transfer.room(&row_bodies_, n);
-    d.balls = transfer.room(&balls_, n);
-    d.substep_bodies = {transfer.room(&substep_bodies_, n), n};
-    d.first_fixed = transfer.room(&first_fixed_, n);
+    const PageLayout layout{.used = used};
+    d.columns = {transfer.room(&cells_, n * CellColumns::kColumns, cell_layout(used)), n};
+    d.row_bodies = transfer.room(&row_bodies_, n, layout);
+    d.balls = transfer.room(&balls_, n, layout);
+    d.substep_bodies = {
+        transfer.room(&substep_bodies_, n, columns_of<soft_step::SubstepBody>(used)), n};
+    d.first_fixed = transfer.room(&first_fixed_, n, layout);
     d.codes = codes_in(d.columns.cells, n);
     if (!may_have_blocks_) return;
-    d.body_at = transfer.room(&body_at_, n);
-    transfer.room(&orientation_by_index_, n);
+    d.body_at = transfer.room(&body_at_, n, layout);
+    transfer.room(&orientation_by_index_, n, layout);
+  }
+
+  /// Layout of the input of the search, which the first device performs.
+  static constexpr PageLayout kOfSearch{.is_shared = false};
+  /// Layout of a StripedArray.
+  template <class T>
+  static PageLayout columns_of(double used = 1) {
+    return {.columns = StripedArray<T>::kPieces, .used = used};
+  }
+  /// Layout of CellColumns, whose velocities are one array of a world with blocks (BodyMotion).
+  static PageLayout cell_layout(double used) {
+    return {.columns = CellColumns::kColumns, .first_width = 2, .used = used};
   }
 
   /// Reserves the arrays of worlds with several blocks. @param n number of slots
@@ -124,6 +153,8 @@ class ScratchBuffers {
     constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
     d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds);
     d.first_inner_joint = transfer.room(&first_inner_joint_, blocks);
+    d.first_of_block = transfer.room(&first_of_block_, blocks);
+    d.block_number = transfer.room(&block_number_, blocks);
   }
 
   static SortedCodes codes_in(VectorCells* memory, std::size_t n) {
@@ -142,7 +173,7 @@ class ScratchBuffers {
 
   Buffer<Vec3> motion_;
   Buffer<Real> margins_;
-  Buffer<SphereInstance> swept_;
+  Buffer<SphereInstance> swept_, searched_;
   Buffer<Aabb> boxes_;
   Buffer<SpherePair> pairs_;
   Buffer<cuda::ContactCount> pair_count_;
@@ -151,7 +182,9 @@ class ScratchBuffers {
   Buffer<CandidateManifold> tested_;
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_, body_at_,
-      solver_index_, unplaced_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_;
+      solver_index_, unplaced_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_,
+      first_of_block_, block_number_, bin_sizes_;
+  Buffer<RowBins> bins_;
   Buffer<soft_step::UsedColors> used_colors_;
   Buffer<std::uint64_t> manifold_sizes_, first_order_;
   Buffer<std::uint8_t> pair_found_, marked_, constrained_, traits_;

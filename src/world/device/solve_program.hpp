@@ -38,7 +38,7 @@ struct SolveProgram : RowSolver<kKinds, BodyCells> {
     const StepData& d = data;
     const bool rebounds = d.counters->any_rebound != 0;
     const SweepList sweeps{d.substeps, rebounds, d.joint_sweeps()};
-    Sweep sweep(team.cached_bins(d.counters->bin_begin), sweeps);
+    Sweep sweep(team.cached_bins(d.bins), sweeps);
     run(team, sweep, soft_step::WarmStart{});
     for (std::uint32_t substep = 0; substep < d.substeps; ++substep) {
       const bool is_last = substep + 1 == d.substeps;

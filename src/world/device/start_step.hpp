@@ -14,6 +14,7 @@ JFPX_HD void start_counters(const Team& team, const StepData& data) {
     static_cast<StepCounters&>(*data.counters) = {};
     data.counters->progress.started = 1;
   });
+  team.for_each_nowait(data.parts * (kBins + 1), [&](std::uint32_t i) { data.bin_sizes[i] = 0; });
 }
 
 /// Saves the columns of a body that the step changes before it can fail.

@@ -3,6 +3,7 @@
 
 #include <jfpx/cuda/sphere_collider.hpp>
 
+#include "src/base/page_layout.hpp"
 #include "src/contact_solver/soft_step/blocks.hpp"
 #include "src/contact_solver/soft_step/contact_lookup.hpp"
 #include "src/contact_solver/soft_step/row_setup.hpp"
@@ -26,18 +27,81 @@ inline constexpr std::uint32_t kNone = 0xffffffffu;
 using soft_step::kBins;
 using soft_step::kBodiesPerBlock;
 
+/// Largest number of devices that share a step.
+inline constexpr std::uint32_t kMostParts = 8;
+
+/// Range of a list.
+struct Range {
+  std::uint32_t begin = 0, end = 0;
+};
+
+/// The share of a part in n items: consecutive items, in the order of parts.
+/// @param each number of items of each part but the last one; 0: all parts have about as many
+JFPX_HD inline Range range_of_part(std::uint32_t n, std::uint32_t part, std::uint32_t parts,
+                                   std::uint32_t each = 0) {
+  if (parts == 1) return {0, n};
+  const auto first = [&](std::uint32_t p) {
+    if (p == parts) return n;
+    if (each == 0) return static_cast<std::uint32_t>(std::uint64_t{n} * p / parts);
+    return n / each < p ? n : p * each;
+  };
+  return {first(part), first(part + 1)};
+}
+/// The part of an item; see range_of_part(). @param each not 0
+JFPX_HD inline std::uint32_t part_of(std::uint32_t item, std::uint32_t parts, std::uint32_t each) {
+  if (parts == 1) return 0;
+  return item / each < parts ? item / each : parts - 1;
+}
+
+/// The blocks of a world.
+struct BlockCounts {
+  std::uint32_t places = 0;         ///< end of the places of all movable bodies
+  std::uint32_t without_place = 0;  ///< number of movable bodies without a place
+
+  /// Number of blocks of bodies with places, which precede the blocks of the other bodies.
+  JFPX_HD std::uint32_t placed() const { return (places + kBodiesPerBlock - 1) / kBodiesPerBlock; }
+  JFPX_HD std::uint32_t all() const {
+    return placed() + (without_place + kBodiesPerBlock - 1) / kBodiesPerBlock;
+  }
+  /// First solver index of the bodies without a place, which start a block.
+  JFPX_HD std::uint32_t first_without_place() const { return placed() * kBodiesPerBlock; }
+  /// Number of solver indices, some of which may be of no body.
+  JFPX_HD std::uint32_t indices() const { return first_without_place() + without_place; }
+  /// The solver indices of a block.
+  JFPX_HD Range indices_of(std::uint32_t block) const {
+    const std::uint32_t begin = block * kBodiesPerBlock, end = begin + kBodiesPerBlock;
+    return {begin, end < indices() ? end : indices()};
+  }
+};
+
+/// The rows of a part, sorted by bin, except inner rows.
+struct RowBins {
+  std::uint32_t begin[kBins + 1];             ///< first row of a bin, and the end
+  std::uint32_t first[soft_step::kRowKinds];  ///< the row that has number 0 in its kind
+  std::uint32_t crossing_colors;              ///< Counters::crossing_colors
+  BlockCounts blocks;                         ///< Counters::blocks
+};
+
+/// Sizes of lists of a part.
+struct PartCounters {
+  std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
+  std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
+  std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
+};
+
 /// Capacities of lists whose size is known only on the device. A step that exceeds a capacity does
 /// not change the state of the world; the host reserves Counters::needed and repeats the step.
 struct Capacity {
-  std::uint64_t pairs = 0;          ///< of swept bounds
-  std::uint32_t spheres = 0;        ///< contacts of two spheres
-  std::uint32_t candidates = 0;     ///< pairs of other sub-shapes, also the capacity of manifolds
-  std::uint32_t points = 0;         ///< of manifolds
-  std::uint32_t touches = 0;        ///< points of World::contacts(), except contacts of two spheres
-  std::uint32_t manifold_rows = 0;  ///< including contacts of spheres without SphereRow
-  std::uint32_t row_points = 0;     ///< points of these rows
-  std::uint32_t indices = 0;        ///< solver indices of a world with blocks
-  std::uint32_t unused = 0;         ///< instead of padding
+  std::uint64_t pairs = 0;       ///< of swept bounds
+  std::uint32_t spheres = 0;     ///< contacts of two spheres
+  std::uint32_t candidates = 0;  ///< pairs of other sub-shapes, also the capacity of manifolds
+  std::uint32_t points = 0;      ///< of manifolds
+  std::uint32_t touches = 0;     ///< points of World::contacts(), except contacts of two spheres
+  /// Of a part: rows of manifolds, including contacts of spheres without SphereRow.
+  std::uint32_t manifold_rows = 0;
+  std::uint32_t row_points = 0;  ///< of a part: points of these rows
+  std::uint32_t rows = 0;        ///< of a part: rows of any kind, if there are several parts
+  std::uint32_t indices = 0;     ///< solver indices of a world with blocks
 
   /// Gives each list room for `needed`, if it is not 0, and slack, so that few steps are repeated
   /// while a heap falls: a quarter of the need, but as much as the need for lists of less than half
@@ -59,6 +123,7 @@ struct Capacity {
     grow_one(&touches, needed.touches);
     grow_one(&manifold_rows, needed.manifold_rows);
     grow_one(&row_points, needed.row_points);
+    grow_one(&rows, needed.rows);
     grow_one(&indices, needed.indices);
   }
 };
@@ -91,16 +156,15 @@ struct StepCounters {
   std::uint32_t any_rests = 0;      ///< 1: a body has been slow for long enough to sleep
   std::uint32_t runaway = kNone;    ///< index of the first body for which is_in_world() is false
   std::uint32_t uncolored[3] = {};  ///< number of contacts without a color, by round modulo 3
-  std::uint32_t bin_begin[kBins + 1] = {};  ///< of rows, except inner rows
-  std::uint32_t places = 0;                 ///< end of the places of all movable bodies
-  std::uint32_t without_place = 0;          ///< number of movable bodies without a place
-  std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
-  std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
-  std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
+  BlockCounts blocks;
+  std::uint32_t manifold_rows = 0;       ///< number of rows of manifolds
+  std::uint32_t crossing_colors = 0;     ///< end of the colors of crossing rows
+  PartCounters parts[kMostParts];        ///< of the rows
   std::uint32_t any_fast = 0;            ///< 1: ContinuousCollision::is_fast() of a sub-shape
-  std::uint32_t unused = 0;              ///< instead of padding
   std::uint64_t largest_coordinate = 0;  ///< partition::magnitude_of()
 
+  std::uint32_t pairs = 0;   ///< of swept bounds
+  std::uint32_t unused = 0;  ///< instead of padding
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
   std::uint32_t touching_spheres = 0;  ///< contacts of two spheres that touched during the step
@@ -131,11 +195,6 @@ struct Touch {
   std::uint16_t is_of_removed_body = 0;  ///< 1: a body was removed after the step
   Vec3 normal, point;
   Real distance = 0;
-};
-
-/// Range of a list.
-struct Range {
-  std::uint32_t begin = 0, end = 0;
 };
 
 /// The contacts of a step on the device.
@@ -183,9 +242,16 @@ struct StepData {
   std::uint32_t substeps = 0;
   Capacity capacity;
   Counters* counters = nullptr;
+  /// Number of devices that share the step, each with its part of the rows; 1 in a world of one
+  /// block. No result depends on it.
+  std::uint32_t parts = 1;
+  /// Number of pairs of swept bounds, of contacts, and of blocks of bodies whose memory each part
+  /// but the last one has, if there are several parts.
+  std::uint32_t pairs_of_part = 0, contacts_of_part = 0, blocks_of_part = 0;
 
-  Vec3* motion = nullptr;       ///< by body
-  SpherePair* pairs = nullptr;  ///< of swept bounds
+  Vec3* motion = nullptr;              ///< by body
+  SphereInstance* searched = nullptr;  ///< copy of the swept bounds, if there are several parts
+  SpherePair* pairs = nullptr;         ///< of swept bounds
   cuda::ContactCount* pair_count = nullptr;
   NormalDistance* pair_results = nullptr;  ///< by pair
   std::uint8_t* pair_found = nullptr;      ///< by pair: 1 if it is a contact of two spheres
@@ -196,13 +262,16 @@ struct StepData {
   /// By body a: its number of manifolds, and in the lower half that of their points.
   std::uint64_t* manifold_sizes = nullptr;
 
-  /// The movable bodies by place, with kNone in unused places, then from first_without_place() on
-  /// the bodies without a place, once PrepareProgram has put them there. The solver index of a body
-  /// is its index in this array, so that the bodies of a block are neighbors in memory. In a world
-  /// of one block, it is that of the body.
+  /// The movable bodies by place, with kNone in unused places, then the
+  /// bodies without a place, once PrepareProgram has put them there. If there are several
+  /// parts, the blocks of places are in the order of `block_number`. The solver index of a body is
+  /// its index in this array, so that the bodies of a block are neighbors in memory. In a world of
+  /// one block, it is that of the body.
   std::uint32_t* body_at = nullptr;
   std::uint32_t* solver_index = nullptr;  ///< by body, of movable bodies in a world with blocks
   std::uint32_t* unplaced = nullptr;      ///< the bodies without a place, in any order
+  /// By block of places, if there are several parts: its first body, and the number of the block.
+  std::uint32_t *first_of_block = nullptr, *block_number = nullptr;
 
   soft_step::UsedColors* used_colors = nullptr;  ///< by body
   /// By body: lowest color_order() of its uncolored contacts, and the lowest of those contacts.
@@ -217,11 +286,13 @@ struct StepData {
   std::uint8_t* marked = nullptr;       ///< by label of an island
   std::uint8_t* constrained = nullptr;  ///< by body: StepBodies::constrained
 
-  std::uint16_t* row_bins = nullptr;  ///< by contact or joint, as RowSetup numbers them
+  std::uint16_t* row_bins = nullptr;   ///< by contact or joint, as RowSetup numbers them
+  std::uint32_t* bin_sizes = nullptr;  ///< by part, kBins + 1 numbers each
+  RowBins* bins = nullptr;             ///< by part
   /// By row of any kind, except inner rows: index of its contact or joint.
   std::uint32_t* row_contact = nullptr;
   StripedArray<soft_step::SphereRow> sphere_rows;
-  std::uint32_t sphere_row_capacity = 0;
+  std::uint32_t row_capacity = 0;  ///< of a part: rows of any kind
   soft_step::ManifoldRow* manifold_rows = nullptr;
   soft_step::PointRow* point_rows = nullptr;
   soft_step::DistanceRow* distance_rows = nullptr;
@@ -278,23 +349,11 @@ struct StepData {
       return nullptr;
     }
   }
-  /// Index in `body_at` of the first body without a place, which starts a block.
-  JFPX_HD std::uint32_t first_without_place() const { return placed_blocks() * kBodiesPerBlock; }
-  /// Number of blocks of bodies with places, which precede the blocks of the other bodies.
-  JFPX_HD std::uint32_t placed_blocks() const {
-    return (counters->places + kBodiesPerBlock - 1) / kBodiesPerBlock;
-  }
-  JFPX_HD std::uint32_t block_count() const {
-    return placed_blocks() + (counters->without_place + kBodiesPerBlock - 1) / kBodiesPerBlock;
-  }
-  /// The range of `body_at` of a block.
-  JFPX_HD Range places_of(std::uint32_t block) const {
-    const std::uint32_t placed = placed_blocks();
-    const bool is_placed = block < placed;
-    const std::uint32_t base = is_placed ? 0 : first_without_place();
-    const std::uint32_t end = base + (is_placed ? counters->places : counters->without_place);
-    const std::uint32_t begin = base + (is_placed ? block : block - placed) * kBodiesPerBlock;
-    return {begin, begin + kBodiesPerBlock < end ? begin + kBodiesPerBlock : end};
+  /// Of a part: capacity of the rows of a kind.
+  JFPX_HD std::uint32_t capacity_of(soft_step::RowKind kind) const {
+    if (kind == soft_step::kKindOf<soft_step::SphereRow>) return row_capacity;
+    if (kind == soft_step::kKindOf<soft_step::ManifoldRow>) return capacity.manifold_rows;
+    return world_joints.of_kind[kind - soft_step::kContactRowKinds];
   }
   /// First inner row of a block, kind and color, of kColorsPerClass + 1 colors: the last element is
   /// the end.
@@ -309,10 +368,6 @@ struct StepData {
   }
   JFPX_HD std::uint32_t body_of(std::uint32_t index) const {
     return step.bodies.has_blocks ? body_at[index] : index;
-  }
-  /// Number of solver indices in a world with blocks, some of which may be of no body.
-  JFPX_HD std::uint32_t index_count() const {
-    return first_without_place() + counters->without_place;
   }
   /// @param index solver index
   JFPX_HD soft_step::RowSetup::SphereProperties sphere(std::uint32_t index) const {

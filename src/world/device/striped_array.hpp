@@ -18,6 +18,8 @@ namespace device {
 template <class T>
 class StripedArray {
  public:
+  static constexpr std::size_t kPieces = sizeof(T) / 16;
+
   StripedArray() = default;
   /// @param memory of `capacity` items, aligned to 16 bytes
   StripedArray(T* memory, std::size_t capacity)
@@ -45,7 +47,6 @@ class StripedArray {
   struct alignas(16) Piece {
     std::uint32_t words[4];
   };
-  static constexpr std::size_t kPieces = sizeof(T) / sizeof(Piece);
   struct Item {
     Piece pieces[kPieces];
   };

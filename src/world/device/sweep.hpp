@@ -71,15 +71,27 @@ struct SweepList {
   }
 };
 
+/// Number of rows without a color, all of which are in the first part. @param begin RowBins::begin
+JFPX_HD inline std::uint32_t overflow_rows(const std::uint32_t* begin) {
+  std::uint32_t rows = 0;
+  for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
+    const std::uint32_t bin = soft_step::bin_of(kind, soft_step::kOverflowGroup);
+    rows += begin[bin + 1] - begin[bin];
+  }
+  return rows;
+}
+
 /// The rows of a sweep, except rows of blocks.
 struct Sweep {
-  const std::uint32_t* begin;  ///< Counters::bin_begin
+  const RowBins& bins;         ///< of a part
+  const std::uint32_t* begin;  ///< RowBins::begin
   SweepList sweeps;
   std::uint32_t colored_items = 0;  ///< number of items for all rows of colors
   std::uint32_t number = 0;
   BodyStage stage = BodyStage::none;  ///< after the rows; not used by BlockSolveProgram
 
-  JFPX_HD Sweep(const std::uint32_t* bins, const SweepList& all) : begin(bins), sweeps(all) {
+  JFPX_HD Sweep(const RowBins& rows, const SweepList& all)
+      : bins(rows), begin(rows.begin), sweeps(all) {
     for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
       for (std::uint32_t group = soft_step::group_of_crossing(0); group < soft_step::kFixedGroup;
            ++group) {
@@ -91,24 +103,17 @@ struct Sweep {
   JFPX_HD soft_step::RowKind kind_of(std::uint32_t row) const {
     return soft_step::kind_of_row(begin, row);
   }
-  /// First row of a kind.
+  /// RowBins::first of a kind.
   template <class Row>
   JFPX_HD std::uint32_t first() const {
-    return begin[soft_step::bin_of(soft_step::kKindOf<Row>, 0)];
+    return bins.first[soft_step::kKindOf<Row>];
   }
   JFPX_HD std::uint32_t size(std::uint32_t bin) const { return begin[bin + 1] - begin[bin]; }
   /// Number of items for the rows of a bin. A warp has rows of one bin only, which are independent.
   JFPX_HD std::uint32_t items(std::uint32_t bin) const {
     return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
   }
-  /// Number of rows without a color.
-  JFPX_HD std::uint32_t overflow() const {
-    std::uint32_t rows = 0;
-    for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
-      rows += size(soft_step::bin_of(kind, soft_step::kOverflowGroup));
-    }
-    return rows;
-  }
+  JFPX_HD std::uint32_t overflow() const { return overflow_rows(begin); }
   JFPX_HD void start(BodyStage next) {
     ++number;
     stage = next;

@@ -1,6 +1,8 @@
 /// Copies between the host and the buffers of a device.
 #pragma once
 
+#include "src/base/page_layout.hpp"
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -26,7 +28,7 @@ class Transfer {
   template <class T>
   const T* put(Buffer<T>* to, const T* from, std::size_t count, std::size_t room = 0) const {
     note_move(to, [&] {
-      device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world");
+      device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world", {});
     });
     device_->upload(to->data(), from, count);
     return to->data();
@@ -42,18 +44,27 @@ class Transfer {
     device_->download(to->data(), from.data(), to->size());
   }
   /// Reserves `count` items and discards the contents. @returns the address
+  /// @param layout if several devices share the array
   template <class T>
-  T* room(Buffer<T>* buffer, std::size_t count) const {
+  T* room(Buffer<T>* buffer, std::size_t count, const PageLayout& layout = {}) const {
     note_move(buffer, [&] {
-      device_->reserve_exactly(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+      device_->reserve_exactly(buffer, std::max<std::size_t>(count, 1), "a step of a world",
+                               layout);
     });
     return buffer->data();
   }
+  /// Whether room() would keep the contents.
+  template <class T>
+  bool fits(const Buffer<T>& buffer, std::size_t count, const PageLayout& layout) const {
+    return device_->fits(buffer, count, layout);
+  }
+  /// Largest number of devices that share an array.
+  std::uint32_t parts() const { return device_->parts(); }
   /// reserve() for a count that may grow slightly from call to call.
   template <class T>
-  T* room_to_grow(Buffer<T>* buffer, std::size_t count) const {
+  T* room_to_grow(Buffer<T>* buffer, std::size_t count, const PageLayout& layout = {}) const {
     note_move(buffer, [&] {
-      device_->reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world");
+      device_->reserve(buffer, std::max<std::size_t>(count, 1), "a step of a world", layout);
     });
     return buffer->data();
   }

@@ -1,0 +1,54 @@
+/// Memory whose pages are on several devices.
+#pragma once
+
+#include "src/base/cuda/device_buffer.hpp"
+#include "src/base/page_layout.hpp"
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace cuda {
+
+/// Lets other devices access the memory of a pool. @param devices all that access it
+void share(const MemoryPool& pool, const std::vector<int>& devices);
+
+/// Owner of a range of addresses that several devices access. Each page is in the memory of one of
+/// them (CUDA's virtual memory management). Not in stream order: the destructor must not be called
+/// while a device uses the memory.
+class MappedMemory {
+ public:
+  MappedMemory() = default;
+  /// @param devices by part; a device may occur more than once
+  /// @throws OutOfMemory with `what` and the number of bytes, DeviceError
+  MappedMemory(const std::vector<int>& devices, std::size_t bytes, const PageLayout& layout,
+               const char* what);
+  ~MappedMemory();
+  MappedMemory(MappedMemory&& other) noexcept { swap(other); }
+  MappedMemory& operator=(MappedMemory&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  void* data() const noexcept { return data_; }
+
+  /// Bytes of a page. Smaller arrays should be on one device.
+  static constexpr std::size_t kPage = std::size_t{2} << 20;
+
+ private:
+  void swap(MappedMemory& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+    std::swap(mapped_, other.mapped_);
+  }
+  void release() noexcept;
+
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;   ///< of the range of addresses
+  std::size_t mapped_ = 0;  ///< of these, with memory
+};
+
+}  // namespace cuda
+}  // namespace JFPX_ABI
+}  // namespace jfpx
