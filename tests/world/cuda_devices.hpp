@@ -16,7 +16,7 @@ inline namespace JFPX_ABI {
 namespace test {
 
 struct CudaDevices {
-  friend void PrintTo(const CudaDevices& devices, std::ostream* out) { *out << devices.name; }
+  friend void PrintTo(const CudaDevices& all, std::ostream* out) { *out << all.name; }
   std::string name;
   std::vector<int> devices;  ///< of make_device_world()
   std::unique_ptr<DeviceWorld> operator()(const Scene& scene) const {

@@ -53,8 +53,7 @@ cudaError_t runtime_error(CUresult result) { return static_cast<cudaError_t>(res
 
 std::vector<int> distinct(std::vector<int> devices) {
   std::ranges::sort(devices);
-  const auto rest = std::ranges::unique(devices);
-  devices.erase(rest.begin(), rest.end());
+  devices.erase(std::unique(devices.begin(), devices.end()), devices.end());
   return devices;
 }
 
