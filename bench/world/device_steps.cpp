@@ -10,7 +10,6 @@
 #include "bench/world/samples.hpp"
 #include "src/base/stopwatch.hpp"
 #include "src/scenes/scenes.hpp"
-#include "src/world/world_impl.hpp"
 
 #include <algorithm>
 #include <cinttypes>
@@ -37,10 +36,8 @@ jfpx::Scene make_scene(const std::string& name, std::uint32_t spheres) {
 void measure(const std::vector<int>& devices, const std::string& name, std::uint32_t spheres,
              int steps) {
   const jfpx::Scene scene = make_scene(name, spheres);
-  jfpx::World world(scene, {.collider = {.backend = jfpx::Backend::cuda}, .threads = 0});
-  if (!devices.empty()) {
-    jfpx::WorldAccess::impl(world).device = jfpx::make_device_world(scene, devices);
-  }
+  jfpx::World world(
+      scene, {.collider = {.backend = jfpx::Backend::cuda}, .devices = devices, .threads = 0});
   std::vector<double> total, detect, resolve, read;
   jfpx::StepReport report;
   for (int n = 0; n < steps; ++n) {

@@ -38,6 +38,11 @@ struct WorldSettings {
   /// DeviceError. With Backend::automatic and Solver::soft_step, the world moves to the device or
   /// back, whichever is predicted to be faster.
   SphereColliderOptions collider = {};
+  /// Numbers of the GPUs that share the world, at most 8, as in available_gpus(); empty:
+  /// collider.device alone. If they are given, collider.device has no effect, Backend::automatic is
+  /// Backend::cuda, the solver is Solver::soft_step, and the GPUs must be linked (Gpu::linked). The
+  /// bits do not depend on them. A GPU may occur several times, which is for tests.
+  std::vector<int> devices = {};
   /// Number of threads of a step on the CPU, at most 256; 0: one per core. With
   /// Solver::worst_first, only the search for sphere contacts uses them.
   unsigned threads = 1;

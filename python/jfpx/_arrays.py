@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -77,6 +77,13 @@ def options(backend: Any, algorithm: Any, threads: Any, device: Any) -> tuple[st
                               "'grid'")
     return (backend, "automatic" if algorithm == "auto" else algorithm,
             count(threads, "threads", 0, 256), count(device, "device", 0, 2**31 - 1))
+
+
+def device_numbers(devices: Any) -> list[int]:
+    """Numbers of GPUs."""
+    if isinstance(devices, str) or not isinstance(devices, Iterable):
+        raise InvalidArgument(f"devices is {devices!r}; it must be a sequence of numbers of GPUs")
+    return [count(device, f"devices[{i}]", 0, 2**31 - 1) for i, device in enumerate(devices)]
 
 
 def to_host(array: Any, name: str) -> np.ndarray:

@@ -387,6 +387,10 @@ class World:
         worst_first, only the search for contacts can use the GPU.
     algorithm, device
         As for SphereCollider.
+    devices : sequence of int, optional
+        Numbers of the GPUs that share the world, at most 8, as in available_gpus(), instead of
+        `device`. The backend "auto" is then "cuda", the solver is soft_step, and the GPUs must be
+        linked. The bits do not depend on them.
     threads : int in [0, 256]
         Number of threads of the CPU; 0: one per core.
     hit_speed : float
@@ -408,15 +412,17 @@ class World:
     InvalidArgument
         An option is out of its range, there is no scene of this name, `scene` has another type, or
         `dtype` is not that of the scene. With several ranks, the backend is "cuda" or the solver
-        worst_first. `communicator` is of another type.
+        worst_first. With `devices`, the backend is "cpu", the solver worst_first, or there are
+        several ranks. `communicator` is of another type.
     BackendUnavailable
-        The backend was requested by name and cannot be used.
+        The backend was requested by name, or by `devices`, and cannot be used.
     OutOfMemory, DeviceError
     """
 
     def __init__(self, scene: Scene | dict[str, Any] | str, *, dtype: Any = None,
                  backend: str = "auto", algorithm: str = "auto", threads: int = 1,
-                 device: int = 0, hit_speed: float = math.inf, communicator: Any = None) -> None:
+                 device: int = 0, devices: Sequence[int] = (), hit_speed: float = math.inf,
+                 communicator: Any = None) -> None:
         if dtype is not None:
             _arrays.precision_of(dtype)
         if isinstance(scene, str):
@@ -430,13 +436,14 @@ class World:
             raise InvalidArgument(f"dtype is {dtype}; that of the scene is {scene.dtype}")
         self._dtype = scene.dtype
         options = _arrays.options(backend, algorithm, threads, device)
+        devices = _arrays.device_numbers(devices)
         hit_speed = _arrays.number(hit_speed, "hit_speed")
         ranks = mpi.communicator_of(communicator)
-        self._core = _arrays.precision_of(self._dtype).World(scene._scene, *options, hit_speed, *ranks)
+        self._core = _arrays.precision_of(self._dtype).World(scene._scene, *options, devices, hit_speed, *ranks)
         self._duplicate = None if ranks[0] is communicator else ranks[0]  # is freed with the world
         self._options = {"backend": backend, "algorithm": algorithm, "threads": threads, "device": device,
-                         "hit_speed": hit_speed}
-        self._device = device
+                         "devices": devices, "hit_speed": hit_speed}
+        self._device = devices[0] if devices else device
         self._report: StepReport | None = None
         self._followers: list[Callable[[], None]] = []  # called after each step
 

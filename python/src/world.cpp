@@ -27,8 +27,10 @@ PyType_Slot kWorldSlots[] = {{Py_tp_traverse, reinterpret_cast<void*>(traverse_w
                              {0, nullptr}};
 
 WorldSettings world_settings(const std::string& backend, const std::string& algorithm,
-                             unsigned threads, int device, double hit_speed) {
+                             unsigned threads, int device, const std::vector<int>& devices,
+                             double hit_speed) {
   return {.collider = collider_options(backend, algorithm, 1, device),
+          .devices = devices,
           .threads = threads,
           .hit_speed = static_cast<Real>(hit_speed)};
 }
@@ -293,15 +295,16 @@ void bind_world(nb::module_& module) {
       .def(
           "__init__",
           [](PythonWorld* self, const Scene& scene, const std::string& backend,
-             const std::string& algorithm, unsigned threads, int device, double hit_speed,
-             nb::object communicator, std::uint32_t rank, std::uint32_t size) {
-            new (self)
-                PythonWorld(scene, world_settings(backend, algorithm, threads, device, hit_speed),
-                            std::move(communicator), rank, size);
+             const std::string& algorithm, unsigned threads, int device,
+             const std::vector<int>& devices, double hit_speed, nb::object communicator,
+             std::uint32_t rank, std::uint32_t size) {
+            new (self) PythonWorld(
+                scene, world_settings(backend, algorithm, threads, device, devices, hit_speed),
+                std::move(communicator), rank, size);
           },
           nb::arg("scene"), nb::arg("backend"), nb::arg("algorithm"), nb::arg("threads"),
-          nb::arg("device"), nb::arg("hit_speed"), nb::arg("communicator").none(), nb::arg("rank"),
-          nb::arg("size"))
+          nb::arg("device"), nb::arg("devices"), nb::arg("hit_speed"),
+          nb::arg("communicator").none(), nb::arg("rank"), nb::arg("size"))
       .def("step", [](PythonWorld& self) { return to_python(self.step()); })
       .def("run", [](PythonWorld& self, std::uint64_t steps) { return to_python(self.run(steps)); })
       .def("close", &PythonWorld::close)

@@ -56,7 +56,7 @@ SphereColliderOptions collider_options(const RunOptions& options) {
   SphereColliderOptions collider;
   collider.backend = options.backend;
   collider.threads = options.threads;
-  if (options.backend == Backend::automatic)
+  if (options.backend == Backend::automatic && options.devices.empty())
     collider.costs = costs_of_this_machine(options.quiet || !writes_output(options));
   return collider;
 }
@@ -64,7 +64,10 @@ SphereColliderOptions collider_options(const RunOptions& options) {
 WorldSettings world_settings(const RunOptions& options) {
   SphereColliderOptions collider = collider_options(options);
   collider.threads = 1;
-  return {.collider = collider, .threads = options.threads, .communicator = options.communicator};
+  return {.collider = collider,
+          .devices = options.devices,
+          .threads = options.threads,
+          .communicator = options.communicator};
 }
 
 std::unique_ptr<Engine> make_engine(EngineKind kind, const Scene& scene,

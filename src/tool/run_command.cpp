@@ -14,9 +14,11 @@
 #include "src/tool/ranks.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include <initializer_list>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -69,11 +71,13 @@ std::string summary(const CommandOptions& options, const Scene& scene, const Eng
   for (const auto& [choice, count] : totals.choices) choices.add({choice, std::to_string(count)});
   const StepMeasures m = engine.measures();
   return fmt::format(
-      "{}: {} bodies, {} steps of {} s, engine {}{}{}, backend {}{}\n"
+      "{}: {} bodies, {} steps of {} s, engine {}{}{}, backend {}{}{}\n"
       "contacts at the end {}, awake {}\n"
       "penetration at the end {:.3g} m deepest, {:.3g} m mean; largest speed {:.3g} m/s\n\n{}\n{}",
       scene.name, engine.states().size(), options.run.steps, text(scene.dt), options.engine,
       engine.resolver().empty() ? "" : ", resolver ", engine.resolver(), engine.backend(),
+      options.run.devices.empty() ? ""
+                                  : fmt::format(", GPUs {}", fmt::join(options.run.devices, ", ")),
       ranks_of(options) == 1 ? "" : fmt::format(", {} ranks", ranks_of(options)), engine.contacts(),
       engine.awake(), m.deepest_penetration, m.mean_penetration, m.largest_speed, table.text(),
       choices.text());
@@ -90,6 +94,7 @@ nlohmann::ordered_json to_json_value(const CommandOptions& options, const Scene&
           {"engine", options.engine},
           {"resolver", resolver},
           {"backend", engine.backend()},
+          {"devices", options.run.devices},
           {"ranks", ranks_of(options)},
           {"precision", kPrecision},
           {"contacts", engine.contacts()},
@@ -263,8 +268,8 @@ void check_engine(const CLI::App& command, const CommandOptions& options) {
     }
   };
   require(EngineKind::bullet, {"--solver", "--world", "--minimum-batch"});
-  require(EngineKind::native,
-          {"--resolver", "--substeps", "--snapshot", "--from", "--checkpoint", "--states"});
+  require(EngineKind::native, {"--devices", "--resolver", "--substeps", "--snapshot", "--from",
+                               "--checkpoint", "--states"});
 }
 
 }  // namespace
@@ -277,6 +282,13 @@ void add_run_command(CLI::App& app, int& status) {
   command->add_option("--engine", options->engine, "native, bullet (with jfpx) or bullet-stock")
       ->check(engine_name())
       ->capture_default_str();
+  command
+      ->add_option(
+          "--devices", options->run.devices,
+          "Native engine with --backend cuda, which is then the default: numbers of the GPUs "
+          "that share the world, separated by commas (see: jfpx devices) [default: one GPU]")
+      ->delimiter(',')
+      ->check(whole_number(std::numeric_limits<int>::max()));
   command->add_option("--input", options->input,
                       "Run as a demo with the inputs in this file (see: jfpx scenes DEMO)");
   command->add_option(

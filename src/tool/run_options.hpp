@@ -47,6 +47,7 @@ struct RunOptions {
   std::optional<Solver> resolver;         ///< replaces Scene::solver
   std::optional<std::uint32_t> substeps;  ///< replaces SoftStepSettings::substeps
   Backend backend = Backend::automatic;
+  std::vector<int> devices;  ///< WorldSettings::devices
   unsigned threads = 1;
   std::optional<std::uint64_t> minimum_batch;   ///< [pairs]; empty: the command's default
   std::string solver = "jfpx", world = "jfpx";  ///< parts of Bullet: "jfpx" or "stock"

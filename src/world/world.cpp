@@ -337,6 +337,29 @@ StepReport World::Impl::make_step() {
   return report;
 }
 
+namespace {
+
+/// @throws InvalidArgument
+void check_devices(const Scene& scene, const WorldSettings& settings) {
+  if (settings.devices.empty()) return;
+  const std::string there_are = "there are " + std::to_string(settings.devices.size()) + " devices";
+  if (settings.devices.size() > kMostDevices) {
+    throw InvalidArgument(there_are + "; at most " + std::to_string(kMostDevices) +
+                          " share a world");
+  }
+  if (settings.collider.backend == Backend::cpu) {
+    throw InvalidArgument(there_are + ", and the backend is cpu; it must be cuda or automatic");
+  }
+  if (scene.solver != Solver::soft_step) {
+    throw InvalidArgument(there_are + ", and the solver is worst_first; it must be soft_step");
+  }
+  if (settings.communicator != nullptr && settings.communicator->size() > 1) {
+    throw InvalidArgument(there_are + "; there must be none for a world of several ranks");
+  }
+}
+
+}  // namespace
+
 World::World(const Scene& scene, const WorldSettings& settings) {
   const bool has_ranks = settings.communicator != nullptr && settings.communicator->size() > 1;
   if (has_ranks && settings.collider.backend == Backend::cuda) {
@@ -355,15 +378,23 @@ World::World(const Scene& scene, const WorldSettings& settings) {
     throw InvalidArgument("hit_speed is " + to_text(settings.hit_speed) +
                           "; it must be > 0; infinity is allowed");
   }
+  check_devices(scene, settings);
   auto pool = std::make_unique<ThreadPool>(settings.threads);
   SphereColliderOptions options = settings.collider;
+  std::vector<int> devices = settings.devices;
+  if (!devices.empty()) {
+    options.backend = Backend::cuda;
+    options.device = devices[0];
+  } else {
+    devices = {options.device};
+  }
   if (has_ranks) options.backend = Backend::cpu;
   auto collider = make_sphere_collider(options, pool.get());
   impl_ = Impl::make(scene, std::move(pool), std::move(collider), settings.broad_phase,
                      settings.collider.simd, settings.communicator);
   impl_->hit_speed = settings.hit_speed;
   if (options.backend == Backend::cuda && scene.solver == Solver::soft_step) {
-    impl_->device = make_device_world(scene, {settings.collider.device});
+    impl_->device = make_device_world(scene, devices);
   }
   if (options.backend == Backend::automatic && backend_row(Backend::cuda).compiled) {
     impl_->automatic = std::make_unique<AutomaticDevice>(

@@ -45,6 +45,31 @@ def test_a_world_on_the_host_has_no_device_states():
             call()
 
 
+@pytest.mark.parametrize("wrong, message", [
+    ({"devices": 2}, "devices is 2; it must be a sequence of numbers of GPUs"),
+    ({"devices": "0,1"}, "devices is '0,1'; it must be a sequence"),
+    ({"devices": [0, 0.5]}, r"devices\[1\] is 0.5; it must be an integer"),
+    ({"devices": [-1]}, r"devices\[0\] is -1; it must be in"),
+    ({"devices": range(9)}, "there are 9 devices; at most 8 share a world"),
+    ({"devices": [0, 1], "backend": "cpu"}, "the backend is cpu; it must be cuda or automatic"),
+])
+def test_gpus_that_cannot_share_a_world_are_an_error(wrong, message):
+    with pytest.raises(jfpx.InvalidArgument, match=message):
+        jfpx.World("pile", **wrong)
+
+
+def test_gpus_that_share_a_world_change_no_bit():
+    if not jfpx.available_gpus():
+        with pytest.raises(jfpx.BackendUnavailable):
+            jfpx.World("pile", devices=[0, 0])
+        return
+    worlds = [jfpx.World("pile", devices=[0, 0]), jfpx.World("pile", backend="cpu")]
+    worlds.append(copy.deepcopy(worlds[0]))
+    assert {world.run(20).step for world in worlds} == {20}
+    assert len({world.state_hash() for world in worlds}) == 1
+    assert [world.report.backend for world in worlds] == ["cuda", "cpu", "cuda"]
+
+
 def test_a_ball_falls_and_comes_to_rest_on_the_floor(dtype):
     world = jfpx.World({"bodies": [BALL, FLOOR]}, dtype=dtype)
     report = world.run(300)

@@ -116,11 +116,13 @@ TEST(Tool, OptionsThatWouldDoNothingAreRefused) {
     }
   }
   for (const std::string engine : {"bullet", "bullet-stock"}) {
-    for (const std::string option : {"--resolver soft-step", "--substeps 2"}) {
+    for (const std::string option : {"--resolver soft-step", "--substeps 2", "--devices 0,1"}) {
       expect_fails("run pile --engine " + engine + " " + option, 2,
                    "requires --engine native; engine is " + engine);
     }
   }
+  expect_fails("run pile --devices 0,1 --backend cpu", 2, "the backend is cpu");
+  expect_fails("run pile --devices 0,one", 2, "--devices");
   for (const std::string command : {"run", "compare", "scenes"}) {
     expect_fails(command + " pile --resolver worst-first --substeps 2", 2,
                  "--substeps requires --resolver soft-step; resolver is worst-first");

@@ -615,6 +615,24 @@ void DeviceWorldTest::compare_heap(int steps) const {
 TEST_P(DeviceWorldTest, AHeapOfManyBlocksHasTheBitsOfTheProcessor) { compare_heap(70); }
 TEST_P(HostPartsTest, AHeapOfManyBlocksHasTheBitsOfTheProcessor) { compare_heap(30); }
 
+TEST(DeviceWorld, GpusThatShareAWorldChangeNoBit) {
+  const auto all = test::several_cuda_devices();
+  if (all.empty()) GTEST_SKIP() << "no GPU";
+  const test::SeveralBlocks several_blocks(8);
+  const Scene scene = scenes::make("heap", {.spheres = 6000});
+  World host(scene, {.collider = {.backend = Backend::cpu}});
+  StepReport expected;
+  for (int n = 0; n < 60; ++n) expected = host.step();
+  for (const auto& [name, devices] : all) {
+    World world(scene, {.devices = devices});
+    StepReport report;
+    for (int n = 0; n < 60; ++n) report = world.step();
+    EXPECT_EQ(report.backend, Backend::cuda) << name << ": " << report.device_failure;
+    EXPECT_EQ(report.contacts, expected.contacts) << name;
+    EXPECT_EQ(world.state_hash(), host.state_hash()) << name;
+  }
+}
+
 /// A body in the slot of a removed one does not take over its impulses or its neighbors.
 TEST_P(DeviceWorldTest, ABodyInTheSlotOfARemovedOneStartsWithoutContacts) {
   const Scene scene = scenes::make("tower", {});

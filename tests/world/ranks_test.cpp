@@ -292,6 +292,10 @@ TEST(Ranks, SettingsThatSeveralRanksDoNotSupportAreRefused) {
     WorldSettings settings = settings_of(communicator);
     settings.collider.backend = Backend::cuda;
     EXPECT_THROW(World({}, settings), InvalidArgument);
+    settings = settings_of(communicator);
+    settings.collider.backend = Backend::automatic;
+    settings.devices = {0, 1};
+    EXPECT_THROW(World({}, settings), InvalidArgument);
     World world({}, settings_of(communicator));
     EXPECT_THROW(world.add_contact_generator([](ContactContext&) {}), InvalidArgument);
   });

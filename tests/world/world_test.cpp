@@ -43,6 +43,22 @@ TEST(World, RefusesThreadsInTheOptionsOfItsCollider) {
   }
 }
 
+TEST(World, RefusesDevicesThatCannotShareIt) {
+  const auto refuse = [](const Scene& scene, const WorldSettings& settings, const char* message) {
+    try {
+      const World world(scene, settings);
+      ADD_FAILURE() << "no exception; expected: " << message;
+    } catch (const InvalidArgument& error) {
+      EXPECT_STREQ(error.what(), message);
+    }
+  };
+  refuse(Scene{}, {.collider = {.backend = Backend::cpu}, .devices = {0, 1}},
+         "there are 2 devices, and the backend is cpu; it must be cuda or automatic");
+  refuse(Scene{.solver = Solver::worst_first}, {.devices = {0}},
+         "there are 1 devices, and the solver is worst_first; it must be soft_step");
+  refuse(Scene{}, {.devices = std::vector<int>(9)}, "there are 9 devices; at most 8 share a world");
+}
+
 TEST(World, StartsInTheStateOfTheScene) {
   Scene scene = two_balls();
   scene.bodies[0].velocity = {1, 2, 3};

@@ -100,10 +100,7 @@ class SharedDevices {
 
 /// The devices of a world. @throws BackendUnavailable if they cannot share memory
 std::vector<int> usable_devices(const std::vector<int>& devices) {
-  if (devices.size() > device::kMostParts) {
-    throw InvalidArgument("devices has " + std::to_string(devices.size()) + " GPUs; at most " +
-                          std::to_string(device::kMostParts) + " can share a world");
-  }
+  static_assert(kMostDevices == device::kMostParts);
   for (const int device : devices) usable_device(device);
   if (const std::string reason = why_not_shared(devices); !reason.empty()) {
     throw BackendUnavailable(reason);
