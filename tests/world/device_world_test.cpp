@@ -21,6 +21,7 @@
 #include <cstdlib>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -614,6 +615,41 @@ void DeviceWorldTest::compare_heap(int steps) const {
 }
 TEST_P(DeviceWorldTest, AHeapOfManyBlocksHasTheBitsOfTheProcessor) { compare_heap(70); }
 TEST_P(HostPartsTest, AHeapOfManyBlocksHasTheBitsOfTheProcessor) { compare_heap(30); }
+
+TEST(DeviceWorld, PartsHaveAsManyContactsAndBodies) {
+  const test::SeveralBlocks several_blocks(8);
+  constexpr std::uint32_t kSide = 20, kResting = kSide * kSide * 10, kFalling = 4000;
+  Scene scene;
+  for (std::uint32_t i = 0; i < kResting + kFalling; ++i) {  // only the first ones touch others
+    const Vec3 site{static_cast<Real>(i % kSide), static_cast<Real>(i / (kSide * kSide)),
+                    static_cast<Real>(i / kSide % kSide)};
+    BodyDef body;
+    body.shape = Sphere{0.5_r};
+    body.position = i < kResting ? site * 0.99_r : site * 3 + Vec3{100, 0, 0};
+    scene.bodies.push_back(body);
+  }
+  World world(scene, {.collider = {.backend = Backend::cpu}});
+  WorldAccess::impl(world).device = test::make_two_part_world(scene);
+  for (int n = 0; n < 3; ++n) world.step();  // bodies have places after the first one
+  auto& step = static_cast<device::DeviceStep<test::HostDevice>&>(*WorldAccess::impl(world).device);
+  const device::Divisions& divisions = step.device().divisions();
+  const std::uint32_t slots = divisions.slots.begin[1];
+  EXPECT_EQ(divisions.slots.begin[0], 0u);
+  const std::span<const Contact> contacts = world.contacts();
+  const auto of_first = static_cast<std::uint64_t>(
+      std::ranges::count_if(contacts, [&](const Contact& c) { return c.a.index < slots; }));
+  const double all = static_cast<double>(contacts.size() + scene.bodies.size());
+  EXPECT_GT(contacts.size(), scene.bodies.size());
+  EXPECT_NEAR(static_cast<double>(of_first + slots) / all, 0.5, 0.02);
+  EXPECT_EQ(divisions.bodies.begin[1], slots);
+  EXPECT_EQ(divisions.sub_shapes.begin[1], slots);
+  const auto is_close = [](std::uint64_t value, std::uint64_t expected) {
+    return value > expected - expected / 20 && value < expected + expected / 20;
+  };
+  EXPECT_PRED2(is_close, divisions.contacts.begin[1], of_first);
+  EXPECT_PRED2(is_close, divisions.pairs.begin[1], of_first);
+  EXPECT_NEAR(divisions.places.begin[1], slots, soft_step::kBodiesPerBlock);
+}
 
 TEST(DeviceWorld, GpusThatShareAWorldChangeNoBit) {
   const auto all = test::several_cuda_devices();

@@ -59,12 +59,12 @@ class HostTeam {
   };
   /// Calls f(block, threads) for all blocks < n.
   template <class F>
-  void for_blocks(std::uint32_t n, const F& f, std::uint32_t each) const {
+  void for_blocks(std::uint32_t n, const F& f, const device::Division* division) const {
     const auto run = [&](std::uint32_t block) {
       memory_.clear();
       f(block, Threads{*this, &memory_});
     };
-    for_each_nowait(n, run, each);
+    for_each_nowait(n, run, division);
   }
   /// The threads of a block.
   struct Threads {
@@ -104,12 +104,13 @@ class HostTeam {
   }
 
   template <class F>
-  void for_each_nowait(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
-    visit(device::range_of_part(n, part_, parts_, each), f);
+  void for_each_nowait(std::uint32_t n, const F& f,
+                       const device::Division* division = nullptr) const {
+    visit(device::range_of_part(n, part_, parts_, division), f);
   }
   template <class F>
-  void for_each(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
-    for_each_nowait(n, f, each);
+  void for_each(std::uint32_t n, const F& f, const device::Division* division = nullptr) const {
+    for_each_nowait(n, f, division);
     sync();
   }
   /// With one thread.
@@ -144,17 +145,17 @@ class HostTeam {
   }
   template <class Condition>
   void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum,
-             std::uint32_t each = 0) const {
+             const device::Division* division = nullptr) const {
     std::uint32_t mine = 0;
     const auto add = [&](std::uint32_t i) { mine += condition(i) ? 1 : 0; };
-    for_each_nowait(n, add, each);
+    for_each_nowait(n, add, division);
     if (mine > 0) atomic_add(sum, mine);
   }
   template <class Measure, class Size, class Place>
   auto scan(std::uint32_t n, const Measure& measure, const Size& size, const Place& place,
-            std::uint32_t each = 0) const {
+            const device::Division* division = nullptr) const {
     using Number = decltype(size(0));
-    const device::Range mine = device::range_of_part(n, part_, parts_, each);
+    const device::Range mine = device::range_of_part(n, part_, parts_, division);
     std::vector<Number> before(mine.end - mine.begin + 1);
     for (std::uint32_t i = mine.begin; i < mine.end; ++i) {
       before[i - mine.begin + 1] = before[i - mine.begin] + measure(i);
@@ -182,9 +183,9 @@ class HostTeam {
   template <class BinOf, class PartOf, class Place>
   void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* sizes, device::RowBins* begin,
                  std::uint32_t capacity, const BinOf& bin_of, const PartOf& part_of,
-                 const Place& place, std::uint32_t each) const {
+                 const Place& place, const device::Division* division) const {
     constexpr std::uint32_t kStride = device::kBins + 1;
-    const device::Range mine = device::range_of_part(n, part_, parts_, each);
+    const device::Range mine = device::range_of_part(n, part_, parts_, division);
     std::vector<std::uint32_t> next(parts_ * kStride);
     for (std::uint32_t i = mine.begin; i < mine.end; ++i) {
       std::uint32_t bin = bin_of(i);
@@ -243,40 +244,31 @@ class HostDevice {
     T* data() const { return const_cast<T*>(items_.data()); }
     std::size_t capacity() const { return items_.size(); }
     /// Poisoned, because device memory is not initialized.
-    void replace(std::size_t count, double used) {
-      used_ = used;
+    void replace(std::size_t count) {
       items_.assign(count, T{});
       std::fill_n(reinterpret_cast<unsigned char*>(items_.data()), count * sizeof(T),
                   static_cast<unsigned char>(0xcd));
     }
-    double used() const { return used_; }  ///< PageLayout::used
-    void swap(Buffer& other) noexcept {
-      items_.swap(other.items_);
-      std::swap(used_, other.used_);
-    }
+    void swap(Buffer& other) noexcept { items_.swap(other.items_); }
 
    private:
     std::vector<T> items_;
-    double used_ = 1;
   };
 
   int number() const { return 0; }
   std::uint32_t parts() const { return parts_; }
-  void use_parts(std::uint32_t) {}
+  void divide(std::uint32_t, const device::Divisions& divisions) { divisions_ = divisions; }
+  const device::Divisions& divisions() const { return divisions_; }  ///< of the last step
   cuda::Stream stream() const { return nullptr; }
 
   template <class T>
-  void reserve(Buffer<T>* buffer, std::size_t count, const char*, const PageLayout& layout) {
-    if (count > buffer->capacity()) buffer->replace(count, layout.used);
+  void reserve(Buffer<T>* buffer, std::size_t count, const char*, const PageLayout&) {
+    if (count > buffer->capacity()) buffer->replace(count);
   }
   template <class T>
-  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char*,
+  void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char* what,
                        const PageLayout& layout) {
-    if (!fits(*buffer, count, layout)) buffer->replace(count, layout.used);
-  }
-  template <class T>
-  bool fits(const Buffer<T>& buffer, std::size_t count, const PageLayout& layout) const {
-    return count <= buffer.capacity() && (parts_ == 1 || buffer.used() == layout.used);
+    reserve(buffer, count, what, layout);
   }
   template <class Program>
   void load() {}
@@ -361,6 +353,7 @@ class HostDevice {
   }
 
   std::uint32_t parts_;
+  device::Divisions divisions_;
   HostTeam::Shared shared_, shared_by_all_;
   std::uint64_t runs_ = 0;
   int runs_left_ = -1;

@@ -80,8 +80,8 @@ void share(const MemoryPool& pool, const std::vector<int>& devices) {
 }
 
 MappedMemory::MappedMemory(const std::vector<int>& devices, std::size_t bytes,
-                           const PageLayout& layout, const char* what) {
-  bytes_ = (bytes + kPage - 1) / kPage * kPage;
+                           const std::vector<std::uint32_t>& parts, const char* what)
+    : bytes_(parts.size() * kPage), devices_(distinct(devices)) {
   const auto attempt = [&](CUresult result, const char* call) {
     if (result == CUDA_SUCCESS) return;
     release();
@@ -89,43 +89,71 @@ MappedMemory::MappedMemory(const std::vector<int>& devices, std::size_t bytes,
   };
   // An injected fault of a test counts as that of the reservation.
   const cudaError_t injected = take_injected_fault();
-  CUdeviceptr address = 0;
+  CUdeviceptr reserved = 0;
   attempt(injected != cudaSuccess ? static_cast<CUresult>(injected)
-                                  : driver().reserve(&address, bytes_, 0, 0, 0),
+                                  : driver().reserve(&reserved, bytes_, 0, 0, 0),
           "cuMemAddressReserve");
-  data_ = reinterpret_cast<void*>(address);
-  const auto device_of = [&](std::size_t page) {
-    const std::size_t middle = std::min(page + kPage / 2, bytes - 1);
-    return devices[layout.part_of(middle, bytes, devices.size())];
-  };
-  while (mapped_ < bytes_) {
-    const int device = device_of(mapped_);
-    std::size_t end = mapped_ + kPage;
-    while (end < bytes_ && device_of(end) == device) end += kPage;
-    const CUmemAllocationProp properties = memory_of(device);
-    CUmemGenericAllocationHandle memory = 0;
-    attempt(driver().create(&memory, end - mapped_, &properties, 0), "cuMemCreate");
-    const CUresult result = driver().map(address + mapped_, end - mapped_, 0, memory, 0);
-    driver().release(memory);  // the mapping keeps the memory
-    attempt(result, "cuMemMap");
-    mapped_ = end;
+  data_ = reinterpret_cast<void*>(reserved);
+  for (std::size_t page = 0; page < parts.size();) {
+    Piece piece{page * kPage, 0, devices[parts[page]], 0};
+    while (page < parts.size() && devices[parts[page]] == piece.device) ++page;
+    piece.end = page * kPage;
+    const CUmemAllocationProp properties = memory_of(piece.device);
+    attempt(driver().create(&piece.memory, piece.end - piece.begin, &properties, 0), "cuMemCreate");
+    pieces_.push_back(piece);
   }
-  std::vector<CUmemAccessDesc> access;
-  for (const int device : distinct(devices)) {
-    access.push_back({memory_of(device).location, CU_MEM_ACCESS_FLAGS_PROT_READWRITE});
-  }
-  attempt(driver().set_access(address, bytes_, access.data(), access.size()), "cuMemSetAccess");
+  attempt(map(), "cuMemMap");
 }
 
 MappedMemory::~MappedMemory() { release(); }
 
+void MappedMemory::move(const std::vector<int>& devices, const std::vector<std::uint32_t>& parts,
+                        const char* what) {
+  const bool is_moved = std::ranges::any_of(pieces_, [&](const Piece& piece) {
+    for (std::size_t page = piece.begin / kPage; page < piece.end / kPage; ++page) {
+      if (devices[parts[page]] != piece.device) return true;
+    }
+    return false;
+  });
+  if (!is_moved) return;
+  MappedMemory moved(devices, bytes_, parts, what);
+  JFPX_CUDA_TRY(cudaMemcpy(moved.data_, data_, bytes_, cudaMemcpyDeviceToDevice));
+  JFPX_CUDA_TRY(cudaDeviceSynchronize());
+  unmap();
+  moved.unmap();
+  pieces_.swap(moved.pieces_);
+  if (const CUresult result = map(); result != CUDA_SUCCESS) {
+    throw_allocation_error(runtime_error(result), bytes_, what, "cuMemMap", __FILE__, __LINE__);
+  }
+}
+
+CUresult MappedMemory::map() {
+  for (const Piece& piece : pieces_) {
+    const CUresult result =
+        driver().map(address() + piece.begin, piece.end - piece.begin, 0, piece.memory, 0);
+    if (result != CUDA_SUCCESS) return result;
+    mapped_ = piece.end;
+  }
+  std::vector<CUmemAccessDesc> access;
+  for (const int device : devices_) {
+    access.push_back({memory_of(device).location, CU_MEM_ACCESS_FLAGS_PROT_READWRITE});
+  }
+  return driver().set_access(address(), bytes_, access.data(), access.size());
+}
+
+void MappedMemory::unmap() noexcept {
+  if (mapped_ > 0) static_cast<void>(driver().unmap(address(), mapped_));
+  mapped_ = 0;
+}
+
 void MappedMemory::release() noexcept {
   if (data_ == nullptr) return;
-  const auto address = reinterpret_cast<CUdeviceptr>(data_);
-  if (mapped_ > 0) static_cast<void>(driver().unmap(address, mapped_));
-  static_cast<void>(driver().free(address, bytes_));
+  unmap();
+  for (const Piece& piece : pieces_) static_cast<void>(driver().release(piece.memory));
+  static_cast<void>(driver().free(address(), bytes_));
+  pieces_.clear();
   data_ = nullptr;
-  mapped_ = bytes_ = 0;
+  bytes_ = 0;
 }
 
 }  // namespace cuda

@@ -22,6 +22,8 @@ struct alignas(128) DeviceBarrier {
   /// The upper half counts the barriers at which all blocks of the device have arrived.
   std::uint32_t arrived;
   std::uint32_t signals[device::kMostParts];  ///< by part: its `arrived` after its last block
+  alignas(128) std::uint32_t passed;  ///< `arrived` of the last barrier at which all have arrived
+  std::uint32_t ended;                ///< not 0: the kernels end
 };
 
 /// The devices that run a program together.
@@ -175,12 +177,12 @@ class GridTeam {
   /// Calls f(block, threads) for all blocks < n of a partition of work, in ascending order, each
   /// with the threads of one block of the launch. All calls with the same n assign a block to the
   /// same threads. The threads of a block wait for each other, but not for other blocks.
-  /// @param each see device::range_of_part()
+  /// @param division see device::range_of_part()
   template <class F>
   [[gnu::always_inline]] JFPX_HD void for_blocks(std::uint32_t n, const F& f,
-                                                 std::uint32_t each) const {
+                                                 const device::Division* division) const {
 #if defined(__CUDA_ARCH__)
-    const device::Range mine = range_of_part(n, each);
+    const device::Range mine = range_of_part(n, division);
     for (std::uint32_t block = mine.begin + block_in_part(); block < mine.end;
          block += blocks_of_part_) {
       f(block, Threads());
@@ -190,19 +192,21 @@ class GridTeam {
   }
 
   /// Calls f(i) for all i < n, in any order, without a barrier.
-  /// @param each see device::range_of_part()
+  /// @param division see device::range_of_part()
   template <class F>
-  JFPX_HD void for_each_nowait(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
+  JFPX_HD void for_each_nowait(std::uint32_t n, const F& f,
+                               const device::Division* division = nullptr) const {
 #if defined(__CUDA_ARCH__)
-    const device::Range mine = range_of_part(n, each);
+    const device::Range mine = range_of_part(n, division);
     const std::uint32_t threads = blocks_of_part_ * kThreads;
     for (std::uint32_t i = mine.begin + thread_in_part(); i < mine.end; i += threads) f(i);
 #endif
   }
   /// Calls f(i) for all i < n, in any order, then waits for all threads.
   template <class F>
-  JFPX_HD void for_each(std::uint32_t n, const F& f, std::uint32_t each = 0) const {
-    for_each_nowait(n, f, each);
+  JFPX_HD void for_each(std::uint32_t n, const F& f,
+                        const device::Division* division = nullptr) const {
+    for_each_nowait(n, f, division);
     sync();
   }
   /// Calls f(thread, number of threads, sync) in each thread, with numbers in its part; all must
@@ -262,13 +266,13 @@ class GridTeam {
   /// Adds the number of i < n for which condition(i) holds, without a barrier.
   template <class Condition>
   JFPX_HD void count(std::uint32_t n, const Condition& condition, std::uint32_t* sum,
-                     std::uint32_t each = 0) const {
+                     const device::Division* division = nullptr) const {
 #if defined(__CUDA_ARCH__)
     std::uint32_t mine = 0;
     const auto add = [&](std::uint32_t i) {
       if (condition(i)) ++mine;
     };
-    for_each_nowait(n, add, each);
+    for_each_nowait(n, add, division);
     mine = warp_sum(mine);
     if (lane_id() == 0 && mine > 0) atomic_add(sum, mine);
 #endif
@@ -278,10 +282,10 @@ class GridTeam {
   /// in the first pass, called once, and size(i) in later passes. @returns the sum of all sizes
   template <class Measure, class Size, class Place>
   JFPX_HD auto scan(std::uint32_t n, const Measure& measure, const Size& size, const Place& place,
-                    std::uint32_t each = 0) const -> decltype(size(0)) {
+                    const device::Division* division = nullptr) const -> decltype(size(0)) {
     using Number = decltype(size(0));
 #if defined(__CUDA_ARCH__)
-    const device::Range chunk = chunk_of(n, each);
+    const device::Range chunk = chunk_of(n, division);
     Number mine = 0;
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
       mine += measure(i);
@@ -318,12 +322,13 @@ class GridTeam {
   template <class BinOf, class PartOf, class Place>
   JFPX_HD void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* sizes,
                          device::RowBins* begin, std::uint32_t capacity, const BinOf& bin_of,
-                         const PartOf& part_of, const Place& place, std::uint32_t each) const {
+                         const PartOf& part_of, const Place& place,
+                         const device::Division* division) const {
 #if defined(__CUDA_ARCH__)
     constexpr std::uint32_t kStride = device::kBins + 1;
     static_assert(device::kMostParts * kStride < soft_step::kNoBin);
     auto* const next = static_cast<std::uint32_t*>(Threads().shared(kPartitionBytes));
-    const device::Range chunk = chunk_of(n, each);
+    const device::Range chunk = chunk_of(n, division);
     for (std::uint32_t b = threadIdx.x; b < parts_ * kStride; b += kThreads) next[b] = 0;
     __syncthreads();
     for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
@@ -456,50 +461,68 @@ class GridTeam {
     return block_in_part() * kThreads + threadIdx.x;
   }
   /// The items of the part of this thread.
-  __device__ device::Range range_of_part(std::uint32_t n, std::uint32_t each = 0) const {
-    return device::range_of_part(n, part_, parts_, each);
+  __device__ device::Range range_of_part(std::uint32_t n,
+                                         const device::Division* division = nullptr) const {
+    return device::range_of_part(n, part_, parts_, division);
   }
 
-  /// Barrier of all blocks of all devices.
+  /// Barrier of all blocks of all devices. The last block of each device exchanges signals with the
+  /// other devices, so that only two fences of a device are of the whole system: such a fence waits
+  /// for all outstanding accesses to other devices.
   __noinline__ __device__ void sync_devices() const {
     __syncthreads();
     bool ends = false;
     if (threadIdx.x == 0) {
       constexpr std::uint32_t kBarrier = 0x10000u;
-      const std::uint32_t mine = all_->mine, count = all_->count;
-      DeviceBarrier* const barrier = all_->barriers[mine];
-      // Another device may already have arrived at the next barrier.
-      const auto passes = [](const std::uint32_t* at, std::uint32_t before) {
-        const std::uint32_t barriers = load_shared(at) / kBarrier - before / kBarrier;
-        return static_cast<std::int16_t>(barriers) > 0;
-      };
+      DeviceBarrier* const barrier = all_->barriers[all_->mine];
       __threadfence();  // the last block makes the writes of all visible to other devices
       const std::uint32_t increment = blockIdx.x == 0 ? kBarrier - (gridDim.x - 1) : 1;
       const std::uint32_t before = atomic_add(&barrier->arrived, increment);
       const std::uint32_t after = before + increment;
-      if (before / kBarrier != after / kBarrier) {  // the last block of the device
-        __threadfence_system();
-        for (std::uint32_t part = 0; part < count; ++part) {
-          if (part != mine) store_shared(&all_->barriers[part]->signals[mine], after);
+      if (before / kBarrier != after / kBarrier) {
+        wait_for_devices(barrier, after);
+        store_shared(&barrier->passed, after);
+      } else {
+        while (!has_passed(&barrier->passed, before)) {
         }
       }
-      while (!passes(&barrier->arrived, before)) {
-      }
-      constexpr std::uint32_t kPollsPerLook = 1024;
-      for (std::uint32_t part = 0; part < count; ++part) {
-        for (std::uint32_t polls = 1; part != mine && !ends; ++polls) {
-          if (passes(&barrier->signals[part], before)) break;
-          if (polls % kPollsPerLook == 0) ends = load_shared(all_->ended) != 0;
-        }
-      }
-      __threadfence_system();
+      ends = load_shared(&barrier->ended) != 0;
+      __threadfence();
     }
     if (__syncthreads_or(ends ? 1 : 0) != 0) asm volatile("exit;");
   }
 
+  /// Whether a barrier word of DeviceBarrier is beyond the barrier that follows `before`. Another
+  /// device may already have arrived at the next barrier.
+  __device__ static bool has_passed(const std::uint32_t* word, std::uint32_t before) {
+    const std::uint32_t barriers = (load_shared(word) >> 16) - (before >> 16);
+    return static_cast<std::int16_t>(barriers) > 0;
+  }
+  /// Signals to the other devices that all blocks of this one have arrived, and waits for theirs.
+  /// @param arrived DeviceBarrier::arrived of this device
+  __device__ void wait_for_devices(DeviceBarrier* barrier, std::uint32_t arrived) const {
+    constexpr std::uint32_t kPollsPerLook = 1024;
+    const std::uint32_t mine = all_->mine, count = all_->count;
+    __threadfence_system();
+    for (std::uint32_t part = 0; part < count; ++part) {
+      if (part != mine) store_shared(&all_->barriers[part]->signals[mine], arrived);
+    }
+    for (std::uint32_t part = 0; part < count; ++part) {
+      if (part == mine) continue;
+      const std::uint32_t before = arrived - 0x10000u;
+      for (std::uint32_t polls = 1; !has_passed(&barrier->signals[part], before); ++polls) {
+        if (polls % kPollsPerLook != 0 || load_shared(all_->ended) == 0) continue;
+        store_shared(&barrier->ended, 1u);
+        return;
+      }
+    }
+    __threadfence_system();
+  }
+
   /// The chunk of items of this block.
-  __device__ device::Range chunk_of(std::uint32_t n, std::uint32_t each = 0) const {
-    const device::Range mine = range_of_part(n, each);
+  __device__ device::Range chunk_of(std::uint32_t n,
+                                    const device::Division* division = nullptr) const {
+    const device::Range mine = range_of_part(n, division);
     const std::uint32_t count = mine.end - mine.begin, blocks = blocks_of_part_;
     const std::uint32_t tiles = (count + kThreads - 1) / kThreads;
     const std::uint32_t size = (tiles + blocks - 1) / blocks * kThreads;

@@ -19,6 +19,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -31,31 +32,59 @@ namespace {
 
 namespace tuning = device::tuning;
 
+/// An array that all devices of a world share.
+class SharedArray {
+ public:
+  /// The arrays of a world, which must outlive them.
+  using List = std::vector<SharedArray*>;
+
+  /// @param first see PageLayout::parts_of_pages()
+  /// @param stream in which the devices use the memory
+  SharedArray(List* all, const std::vector<int>& devices, std::size_t bytes,
+              const PageLayout& layout, const std::vector<double>& first, const char* what,
+              Stream stream)
+      : all_(all),
+        layout_(layout),
+        bytes_(bytes),
+        what_(what),
+        stream_(stream),
+        memory_(devices, bytes, layout.parts_of_pages(bytes, MappedMemory::kPage, first), what) {
+    all_->push_back(this);
+  }
+  ~SharedArray() {
+    std::erase(*all_, this);
+    static_cast<void>(cudaStreamSynchronize(stream_));
+  }
+  SharedArray(const SharedArray&) = delete;
+  SharedArray& operator=(const SharedArray&) = delete;
+
+  void* data() const noexcept { return memory_.data(); }
+  const PageLayout& layout() const noexcept { return layout_; }
+  /// Moves pages, while no device uses them.
+  void move(const std::vector<int>& devices, const std::vector<double>& first) {
+    memory_.move(devices, layout_.parts_of_pages(bytes_, MappedMemory::kPage, first), what_);
+  }
+
+ private:
+  List* all_;
+  PageLayout layout_;
+  std::size_t bytes_;
+  const char* what_;
+  Stream stream_;
+  MappedMemory memory_;
+};
+
 /// Memory of the first device of a world, or of all of them.
 class WorldMemory {
  public:
   WorldMemory() = default;
   explicit WorldMemory(DeviceMemory memory) : of_one_(std::move(memory)) {}
-  /// @param stream in which the devices use the memory
-  WorldMemory(MappedMemory memory, Stream stream) : of_all_(std::move(memory)), stream_(stream) {}
-  ~WorldMemory() {
-    if (of_all_.data() != nullptr) static_cast<void>(cudaStreamSynchronize(stream_));
-  }
-  WorldMemory(WorldMemory&&) noexcept = default;
-  WorldMemory& operator=(WorldMemory&& other) noexcept {
-    std::swap(of_one_, other.of_one_);
-    std::swap(of_all_, other.of_all_);
-    std::swap(stream_, other.stream_);
-    return *this;
-  }
-  void* data() const noexcept {
-    return of_all_.data() != nullptr ? of_all_.data() : of_one_.data();
-  }
+  explicit WorldMemory(std::unique_ptr<SharedArray> array) : of_all_(std::move(array)) {}
+  void* data() const noexcept { return of_all_ != nullptr ? of_all_->data() : of_one_.data(); }
 
  private:
   DeviceMemory of_one_;
-  MappedMemory of_all_;
-  Stream stream_ = nullptr;
+  std::unique_ptr<SharedArray> of_all_;
 };
 
 /// Orders the programs of all worlds on several devices. Otherwise, the program of one world could
@@ -117,15 +146,11 @@ class CudaDevice {
    public:
     T* data() const noexcept { return array_.data(); }
     std::size_t capacity() const noexcept { return array_.capacity(); }
-    void swap(Buffer& other) noexcept {
-      array_.swap(other.array_);
-      std::swap(used_, other.used_);
-    }
+    void swap(Buffer& other) noexcept { array_.swap(other.array_); }
 
    private:
     friend CudaDevice;
     GrowableArray<T, WorldMemory> array_;
-    double used_ = 0;  ///< PageLayout::used of an array that all devices share; otherwise 0
   };
 
   /// @param devices by part; a device may occur more than once
@@ -158,25 +183,31 @@ class CudaDevice {
   int number() const noexcept { return device_; }
   Stream stream() const noexcept { return stream_.get(); }
   std::uint32_t parts() const noexcept { return static_cast<std::uint32_t>(devices_.size()); }
-  void use_parts(std::uint32_t parts) { shares_memory_ = parts > 1; }
+  /// Divides the arrays that are allocated later, and those that exist.
+  void divide(std::uint32_t parts, const device::Divisions& divisions) {
+    shares_memory_ = parts > 1;
+    divisions_ = divisions;
+    if (!shares_memory_) return;
+    wait();
+    const DeviceGuard guard(device_);
+    for (SharedArray* array : shared_arrays_) {
+      try {
+        array->move(devices_, first_items(array->layout()));
+      } catch (const OutOfMemory&) {  // its pages stay where they are, which only costs time
+        static_cast<void>(cudaGetLastError());
+      }
+    }
+  }
 
   template <class T>
   void reserve(Buffer<T>* buffer, std::size_t count, const char* what, const PageLayout& layout) {
     if (count <= buffer->capacity()) return;
-    const std::size_t capacity = geometric_capacity(buffer->capacity(), count);
-    PageLayout with_slack = layout;
-    with_slack.used *= static_cast<double>(count) / static_cast<double>(capacity);
-    replace(buffer, capacity, what, with_slack);
+    replace(buffer, geometric_capacity(buffer->capacity(), count), count, what, layout);
   }
   template <class T>
   void reserve_exactly(Buffer<T>* buffer, std::size_t count, const char* what,
                        const PageLayout& layout) {
-    if (!fits(*buffer, count, layout)) replace(buffer, count, what, layout);
-  }
-  /// Whether a buffer has room, in pages of this layout if all devices share it.
-  template <class T>
-  bool fits(const Buffer<T>& buffer, std::size_t count, const PageLayout& layout) const {
-    return count <= buffer.capacity() && (buffer.used_ == 0 || buffer.used_ == layout.used);
+    if (count > buffer->capacity()) replace(buffer, count, count, what, layout);
   }
   /// Loads a program, so that it can be launched while a stream is being captured.
   template <class Program>
@@ -385,20 +416,35 @@ class CudaDevice {
   template <class Program>
   struct Limits : Launch {};
 
+  /// By part: its first item, as a fraction of the items of a column.
+  std::vector<double> first_items(const PageLayout& layout) const {
+    std::vector<double> first(devices_.size());
+    const device::Division* const division = divisions_.of(layout.index);
+    for (std::size_t part = 0; part < first.size(); ++part) {
+      first[part] = division == nullptr
+                        ? static_cast<double>(part) / static_cast<double>(first.size())
+                        : division->begin[part] / static_cast<double>(layout.items);
+    }
+    return first;
+  }
+
   /// Gives a buffer other memory: of all devices for a large array, otherwise of the first one.
+  /// @param used number of elements without slack
   template <class T>
-  void replace(Buffer<T>* buffer, std::size_t capacity, const char* what,
-               const PageLayout& layout) {
+  void replace(Buffer<T>* buffer, std::size_t capacity, std::size_t used, const char* what,
+               PageLayout layout) {
     const DeviceGuard guard(device_);
-    const bool is_shared = shares_memory_ && layout.is_shared &&
+    const bool is_shared = shares_memory_ && layout.index != ArrayIndex::of_first &&
                            capacity * sizeof(T) >= devices_.size() * MappedMemory::kPage;
+    if (layout.items == 0) layout.items = used;
+    layout.items = layout.items * capacity / used;
     GrowableArray<T, WorldMemory> array;
     array.reserve(capacity, [&](std::size_t bytes) {
       if (!is_shared) return WorldMemory(DeviceMemory(pool_, stream_.get(), bytes, what));
-      return WorldMemory(MappedMemory(devices_, bytes, layout, what), stream_.get());
+      return WorldMemory(std::make_unique<SharedArray>(&shared_arrays_, devices_, bytes, layout,
+                                                       first_items(layout), what, stream_.get()));
     });
     buffer->array_.swap(array);
-    buffer->used_ = is_shared ? layout.used : 0;
   }
 
   /// Creates what several devices need.
@@ -412,7 +458,9 @@ class CudaDevice {
     ended_.reserve(1, "barriers");
     *ended_.data() = 0;
     parts_.ended = ended_.data();
-    barriers_ = MappedMemory(devices_, devices_.size() * MappedMemory::kPage, {}, "barriers");
+    std::vector<std::uint32_t> by_part(devices_.size());
+    std::iota(by_part.begin(), by_part.end(), 0u);
+    barriers_ = MappedMemory(devices_, devices_.size() * MappedMemory::kPage, by_part, "barriers");
     parts_.count = parts();
     for (std::size_t part = 0; part < devices_.size(); ++part) {
       parts_.barriers[part] = reinterpret_cast<DeviceBarrier*>(
@@ -492,6 +540,8 @@ class CudaDevice {
   std::vector<std::unique_ptr<OwnedStream>> other_streams_;
   std::vector<Stream> streams_;  ///< by part
   bool shares_memory_ = false;   ///< whether all devices share memory that is reserved now
+  device::Divisions divisions_;
+  SharedArray::List shared_arrays_;
   MappedMemory barriers_;
   PinnedBuffer<std::uint32_t> ended_;  ///< TeamParts::ended
   TeamParts parts_;

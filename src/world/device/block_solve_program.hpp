@@ -212,7 +212,7 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     const auto run = [&](std::uint32_t block, const auto& threads) {
       run_block(threads, before, phase, block);
     };
-    team.for_blocks(sweep.bins.blocks.all(), run, data.blocks_of_part);
+    team.for_blocks(sweep.bins.blocks.all(), run, &data.divisions.blocks);
   }
 
   /// @param before the sweep before, whose rows with fixed bodies are solved

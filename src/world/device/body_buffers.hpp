@@ -72,7 +72,7 @@ class BodyBuffers {
   }
   /// Room for the ids of `count` bodies. swap_ids() makes them the current ones.
   BodyId* other_ids(const Transfer<Device>& transfer, std::size_t count) {
-    return transfer.room_to_grow(&ids_[1 - ids_now_], count);
+    return transfer.room_to_grow(&ids_[1 - ids_now_], count, {.index = ArrayIndex::body});
   }
   void swap_ids(std::size_t count, BodyView* bodies) {
     ids_now_ = 1 - ids_now_;
@@ -97,7 +97,7 @@ class BodyBuffers {
     each_property(put, *to, properties_, from);
     each_inertia(put, *to, inertia_, from);
     update_pairs(transfer, from, to);
-    to->ids = transfer.put(&ids_[ids_now_], from.ids, from.count);
+    to->ids = transfer.put(&ids_[ids_now_], from.ids, from.count, 0, ArrayIndex::body);
   }
 
   void upload_motion(const Transfer<Device>& transfer, const MotionArrays& from, std::size_t room,

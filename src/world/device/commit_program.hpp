@@ -36,18 +36,18 @@ struct CommitProgram {
           store_impulses(setup, i);
           return soft_step::has_touched(contacts, i);
         },
-        &d.counters->touching_spheres, d.contacts_of_part);
+        &d.counters->touching_spheres, &d.divisions.contacts);
     team.for_each_nowait(setup.size() - contacts.sphere_count, [&](std::uint32_t i) {
       store_impulses(setup, contacts.sphere_count + i);
     });
     ContinuousCollision{d.step, d.swept_bounds.sub_shapes, d.trees}.run(
-        team, bodies.count, [&](std::uint32_t i) { return bodies.ids[i].index; },
-        &d.counters->any_fast);
+        DividedTeam<Team>{team, d.divisions.sub_shapes}, bodies.count,
+        [&](std::uint32_t i) { return bodies.ids[i].index; }, &d.counters->any_fast);
     const DeviceContacts& now = d.now();
     Vec3* const position_before = now.position_before;
     Vec3* const velocity_before = now.velocity_before;
     Vec3* const angular_velocity_before = now.angular_velocity_before;
-    team.for_each(bodies.count, [&](std::uint32_t i) {
+    const auto store = [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       position_before[body] = bodies.position[body];
       if (velocity_before != nullptr) {
@@ -55,11 +55,12 @@ struct CommitProgram {
         angular_velocity_before[body] = bodies.angular_velocity[body];
       }
       if (d.step.store(body)) d.counters->any_rests = 1;
-    });
+    };
+    team.for_each(bodies.count, store, &d.divisions.bodies);
     if (d.counters->any_rests != 0) d.islands().put_to_sleep(team);
     team.count(
         bodies.count, [&](std::uint32_t i) { return bodies.is_active(bodies.ids[i].index); },
-        &d.counters->awake);
+        &d.counters->awake, &d.divisions.bodies);
     team.for_each_nowait(contacts.manifold_count, [&](std::uint32_t m) {
       const std::uint32_t begun = soft_step::count_begun(contacts, contacts.sphere_count + m);
       if (begun > 0) atomic_add(&d.counters->begun_points, begun);
@@ -73,6 +74,17 @@ struct CommitProgram {
   }
 
  private:
+  /// A team whose loops are divided by sub-shapes, or by bodies, whose numbers are close to those.
+  template <class Team>
+  struct DividedTeam {
+    const Team& team;
+    const Division& division;
+    template <class F>
+    JFPX_HD void for_each(std::uint32_t n, const F& f) const {
+      team.for_each(n, f, &division);
+    }
+  };
+
   /// Stores the impulses of the row of a contact or joint.
   JFPX_HD void store_impulses(const soft_step::RowSetup& setup, std::uint32_t i) const {
     const soft_step::RowKind kind = setup.kind_of(i);

@@ -26,15 +26,17 @@ class ContactBuffers {
   void upload(const Transfer<Device>& transfer, const soft_step::ContactView& from,
               std::size_t room) {
     sizes_ = {from.sphere_count, from.manifold_count, from.point_count, 0};
-    transfer.put(&spheres_, from.spheres, from.sphere_count);
-    transfer.put(&manifolds_, from.manifolds, from.manifold_count);
-    transfer.put(&points_, from.points, from.point_count);
-    transfer.put(&impulses_, from.impulses, std::size_t{from.sphere_count} + from.point_count);
+    constexpr ArrayIndex kContact = ArrayIndex::contact;
+    transfer.put(&spheres_, from.spheres, from.sphere_count, 0, kContact);
+    transfer.put(&manifolds_, from.manifolds, from.manifold_count, 0, ArrayIndex::equal);
+    transfer.put(&points_, from.points, from.point_count, 0, ArrayIndex::equal);
+    transfer.put(&impulses_, from.impulses, std::size_t{from.sphere_count} + from.point_count, 0,
+                 kContact);
     // A device always stores the rolling impulses.
     const std::vector<Vec3> none(from.rolling_impulses != nullptr ? 0 : from.size());
     transfer.put(&rolling_impulses_, none.empty() ? from.rolling_impulses : none.data(),
-                 from.size());
-    transfer.put(&colors_, from.colors, from.size());
+                 from.size(), 0, kContact);
+    transfer.put(&colors_, from.colors, from.size(), 0, kContact);
     put_ranges(transfer, &spheres_of_, from.spheres, from.sphere_count, room);
     put_ranges(transfer, &manifolds_of_, from.manifolds, from.manifold_count, room);
   }
@@ -43,18 +45,17 @@ class ContactBuffers {
   void keep_velocities(bool keeps) { keeps_velocities_ = keeps; }
   /// Reserves memory for the contacts of the next step, and keeps those of the last step.
   /// @param room number of slots of bodies, as in the last upload
-  /// @param shared number of contacts that the devices share
-  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room,
-               std::size_t shared) {
+  void reserve(const Transfer<Device>& transfer, const Capacity& capacity, std::size_t room) {
     const std::size_t contacts = std::size_t{capacity.spheres} + capacity.candidates;
     const std::size_t kept = std::size_t{sizes_.spheres} + sizes_.manifolds;
-    grow(transfer, &spheres_, capacity.spheres, sizes_.spheres, shared);
+    constexpr ArrayIndex kContact = ArrayIndex::contact;
+    grow(transfer, &spheres_, capacity.spheres, sizes_.spheres, kContact);
     grow(transfer, &manifolds_, capacity.candidates, sizes_.manifolds);
     grow(transfer, &points_, capacity.points, sizes_.points);
     grow(transfer, &impulses_, std::size_t{capacity.spheres} + capacity.points,
-         std::size_t{sizes_.spheres} + sizes_.points, shared);
-    grow(transfer, &rolling_impulses_, contacts, kept, shared);
-    grow(transfer, &colors_, contacts, kept, shared);
+         std::size_t{sizes_.spheres} + sizes_.points, kContact);
+    grow(transfer, &rolling_impulses_, contacts, kept, kContact);
+    grow(transfer, &colors_, contacts, kept, kContact);
     grow(transfer, &touches_, capacity.touches, sizes_.touches);
     transfer.room(&spheres_of_, room);
     transfer.room(&manifolds_of_, room);
@@ -132,12 +133,11 @@ class ContactBuffers {
   /// Makes the capacity of an array at least `count`, and keeps its first items.
   template <class T>
   static void grow(const Transfer<Device>& transfer, Buffer<T>* array, std::size_t count,
-                   std::size_t kept, std::size_t shared = 0) {
+                   std::size_t kept, ArrayIndex index = ArrayIndex::equal) {
     count = std::max(count, kept);
-    const PageLayout layout = shared == 0 ? PageLayout{} : PageLayout::of(shared, count);
-    if (transfer.fits(*array, count, layout) && array->capacity() > 0) return;
+    if (count <= array->capacity() && array->capacity() > 0) return;
     Buffer<T> larger;
-    T* const to = transfer.room(&larger, count, layout);
+    T* const to = transfer.room(&larger, count, {.index = index});
     transfer.copy(to, array->data(), kept);
     array->swap(larger);
   }

@@ -26,27 +26,32 @@ struct BoundsProgram {
     if (!is_started) start_counters(team, d);
     if (bodies.has_blocks) {  // a block of places may be incomplete
       const std::uint32_t blocks = (bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock;
-      team.for_each_nowait(blocks * kBodiesPerBlock,
-                           [&](std::uint32_t i) { d.body_at[i] = kNone; });
+      team.for_each_nowait(
+          blocks * kBodiesPerBlock, [&](std::uint32_t i) { d.body_at[i] = kNone; },
+          &d.divisions.places);
     }
-    team.for_each(bodies.capacity, [&](std::uint32_t i) { start(i); });
+    team.for_each(
+        bodies.capacity, [&](std::uint32_t i) { start(i); }, &d.divisions.slots);
     if (bodies.has_blocks && d.world_joints.count > 0) {
       team.for_each_nowait((bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock,
                            [&](std::uint32_t block) { d.first_inner_joint[block] = kNone; });
     }
     if (d.parts > 1) number_blocks(team);
     std::uint32_t places = 0;  // of this thread
-    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
+    const auto put = [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.is_asleep(body)) d.counters->any_asleep = 1;
       if (bodies.has_blocks && bodies.movable(body)) put_into_block(body, &places);
-    });
+    };
+    team.for_each_nowait(bodies.count, put, &d.divisions.bodies);
     if (places > 0) raise(&d.counters->blocks.places, places);
-    team.for_each_nowait(d.swept_bounds.sub_shapes.ranges.bounded(), [&](std::uint32_t i) {
+    const auto sweep = [&](std::uint32_t i) {
       d.swept_bounds.sub_shapes.update_pose(bodies, i);
       d.swept_bounds.sweep(i);
       if (d.parts > 1) d.searched[i] = d.swept_bounds.swept[i];
-    });
+    };
+    team.for_each_nowait(d.swept_bounds.sub_shapes.ranges.bounded(), sweep,
+                         &d.divisions.sub_shapes);
     if (d.trees.kinematic.block_count > 0) refit(team, d.trees.kinematic);
   }
 
@@ -75,25 +80,27 @@ struct BoundsProgram {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
     std::uint32_t places = 0;  // of this thread
-    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
+    const auto note_place = [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (!bodies.movable(body)) return;
       const std::uint32_t place = bodies.place[body];
       if (place == soft_step::kNoPlace) return;
       if (place >= places) places = place + 1;
       if (place % kBodiesPerBlock == 0) d.first_of_block[place / kBodiesPerBlock] = body;
-    });
+    };
+    team.for_each_nowait(bodies.count, note_place, &d.divisions.bodies);
     if (places > 0) raise(&d.counters->blocks.places, places);
     team.sync();
     const std::uint32_t blocks = d.counters->blocks.placed();
-    team.for_each(blocks, [&](std::uint32_t block) {
-      const std::uint32_t first = d.first_of_block[block];
+    constexpr std::uint32_t kThreads = 32;  // that count for one block
+    team.for_each(blocks * kThreads, [&](std::uint32_t i) {
+      const std::uint32_t block = i / kThreads, first = d.first_of_block[block];
       std::uint32_t number = 0;
-      for (std::uint32_t other = 0; other < blocks; ++other) {
+      for (std::uint32_t other = i % kThreads; other < blocks; other += kThreads) {
         const std::uint32_t it = d.first_of_block[other];
         if (it < first || (it == first && other < block)) ++number;
       }
-      d.block_number[block] = number;
+      if (number > 0) atomic_add(&d.block_number[block], number);
     });
   }
 
@@ -121,8 +128,10 @@ struct BoundsProgram {
     d.first_candidate[body] = kNone;
     d.manifold_sizes[body] = 0;
     d.used_colors[body] = {};
-    if (d.parts > 1 && body % kBodiesPerBlock == 0)
+    if (d.parts > 1 && body % kBodiesPerBlock == 0) {
       d.first_of_block[body / kBodiesPerBlock] = kNone;
+      d.block_number[body / kBodiesPerBlock] = 0;
+    }
     d.first_order[body] = ~std::uint64_t{0};
     d.first_contact[body] = kNone;
     d.constrained[body] = 0;
@@ -153,7 +162,8 @@ struct SphereProgram {
     }
     const SubShapeRanges& ranges = d.swept_bounds.sub_shapes.ranges;
     if (ranges.fixed_begin() < ranges.all()) {
-      team.for_each_nowait(ranges.fixed_begin(), [&](std::uint32_t i) { find_fixed(i); });
+      team.for_each_nowait(
+          ranges.fixed_begin(), [&](std::uint32_t i) { find_fixed(i); }, &d.divisions.sub_shapes);
     }
     const auto pairs = static_cast<std::uint32_t>(d.pair_count->contacts);
     const std::uint32_t found = team.scan(
@@ -170,7 +180,7 @@ struct SphereProgram {
           const NormalDistance result = d.pair_results[i];
           d.now().view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
         },
-        d.pairs_of_part);
+        &d.divisions.pairs);
     team.once([&] {
       Counters& c = *d.counters;
       c.pairs = pairs;
@@ -228,16 +238,19 @@ struct ShapeProgram {
     if (data.has_failed()) return;
     const StepData& d = data;
     if (d.counters->candidates == 0) {
-      team.for_each_nowait(d.step.bodies.capacity,
-                           [&](std::uint32_t i) { d.now().manifolds_of[i] = {}; });
+      team.for_each_nowait(
+          d.step.bodies.capacity, [&](std::uint32_t i) { d.now().manifolds_of[i] = {}; },
+          &d.divisions.slots);
       return;
     }
     team.for_each(d.counters->candidates, [&](std::uint32_t i) { test(i); });
-    team.for_each(d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); });
+    team.for_each(
+        d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); }, &d.divisions.slots);
     const auto size = [&](std::uint32_t body) { return d.manifold_sizes[body]; };
-    const std::uint64_t sizes =
-        team.scan(d.step.bodies.capacity, size, size,
-                  [&](std::uint32_t body, std::uint64_t first) { add_manifolds(body, first); });
+    const std::uint64_t sizes = team.scan(
+        d.step.bodies.capacity, size, size,
+        [&](std::uint32_t body, std::uint64_t first) { add_manifolds(body, first); },
+        &d.divisions.slots);
     team.once([&] {
       Counters& c = *d.counters;
       c.manifolds = static_cast<std::uint32_t>(sizes >> 32);

@@ -21,6 +21,7 @@
 #include "src/world/device/sub_shape_buffers.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -33,13 +34,13 @@ inline constexpr int kMarks = 4;
 
 /// @tparam Device owns a stream of work, or emulates one on the host:
 ///   - `number()`, `stream()`: see cuda::DeviceStates; `parts()`: largest StepData::parts;
-///     `use_parts(parts)`: selects whether all devices share memory that is reserved later;
+///   - `divide(parts, divisions)`: selects the devices of arrays that are reserved later, and moves
+///     the pages of the others, with their addresses and contents; waits if there are several
+///     parts;
 ///   - `Buffer<T>`: array in the memory of the device; data(), capacity(), swap();
 ///   - `reserve(&buffer, count, what, layout)`, `reserve_exactly(&buffer, count, what, layout)`:
-///   make
-///     the capacity at least `count`, with and without slack, and discard the contents if the
-///     buffer does not fit; `fits(buffer, count, layout)`; `release_unused()`: gives memory of
-///     smaller buffers back;
+///     make the capacity at least `count`, with and without slack, and discard the contents of a
+///     smaller buffer; `release_unused()`: gives memory of smaller buffers back;
 ///   - `upload(to, from, count)`, `download(to, from, count)`, `copy(to, from, count)`;
 ///   - `fetch(copies, pool)`: performs HostCopies, and waits;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: see cuda::DeviceSphereCollider, after
@@ -74,7 +75,19 @@ class DeviceStep final : public DeviceWorld {
     if (bodies.capacity() > room_) {
       room_ = room_ == 0 ? bodies.capacity() : bodies.capacity() + bodies.capacity() / 2;
     }
-    device_->use_parts(bodies.has_blocks() ? device_->parts() : 1);
+    const soft_step::ContactView kept = last->view();
+    data_.parts = bodies.has_blocks() ? device_->parts() : 1;
+    const auto equal = [&](std::size_t n) {
+      return Division::equal(static_cast<std::uint32_t>(n), data_.parts);
+    };
+    data_.divisions.slots = equal(bodies.capacity());
+    data_.divisions.contacts = equal(kept.sphere_count);
+    data_.divisions.pairs = equal(kept.sphere_count);
+    data_.divisions.blocks = equal(bodies.capacity() / kBodiesPerBlock);
+    scale_divisions(static_cast<std::uint32_t>(bodies.capacity()),
+                    static_cast<std::uint32_t>(bodies.size()), sub_shapes->view().ranges.bounded());
+    device_->divide(data_.parts, data_.divisions);
+    divided_ = {};
     bodies_.upload(transfer_, bodies, room_, &data_);
     scratch_.reserve_bodies(transfer_, room_, &data_);
     hulls_.clear();
@@ -83,7 +96,7 @@ class DeviceStep final : public DeviceWorld {
     trees_.clear();
     update_trees(bodies);
     known_ = sent_ = {};
-    last_contacts().upload(transfer_, last->view(), room_);
+    last_contacts().upload(transfer_, kept, room_);
     for (Contacts& contacts : contacts_) contacts.keep_velocities(keeps_velocities);
     known_.contacts[1 - now()] = last_contacts().sizes();
     Counters counters;
@@ -256,10 +269,7 @@ class DeviceStep final : public DeviceWorld {
   }
 
   Vec3 fetch_position(std::uint32_t body) override {
-    Vec3 position;
-    device_->download(&position, data_.step.motion.position + body, 1);
-    device_->wait();
-    return position;
+    return fetch(data_.step.motion.position + body);
   }
 
   void fetch_states(MotionArrays* moving, ThreadPool* pool) override {
@@ -360,6 +370,7 @@ class DeviceStep final : public DeviceWorld {
   /// Index of the contacts of the step before the last, between two steps.
   std::uint64_t now() const { return known_.completed & 1; }
   Contacts& last_contacts() { return contacts_[1 - now()]; }
+  const Contacts& last_contacts() const { return contacts_[1 - now()]; }
   void use_contacts() {
     for (int i = 0; i < 2; ++i) data_.contacts_of[i] = contacts_[i].view();
   }
@@ -411,32 +422,116 @@ class DeviceStep final : public DeviceWorld {
   /// Reserves memory, so that the step allocates nothing.
   void make_room() {
     if (is_ready_) return;
-    data_.parts = data_.step.bodies.has_blocks ? device_->parts() : 1;
-    device_->use_parts(data_.parts);
-    divide(pairs_, 1024, &data_.pairs_of_part);
-    divide(last_contacts().sizes().spheres, 1024, &data_.contacts_of_part);
-    divide(data_.step.bodies.movable_count / kBodiesPerBlock, 1, &data_.blocks_of_part);
+    divide();
     const std::uint64_t moves = transfer_.moves();
     scratch_.reserve_lists(transfer_, capacity_, &data_);
-    const std::size_t shared = std::size_t{data_.parts} * data_.contacts_of_part;
-    for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_, shared);
+    for (Contacts& contacts : contacts_) contacts.reserve(transfer_, capacity_, room_);
     use_contacts();
     device_->reserve_pairs(data_.swept_bounds.sub_shapes.ranges.fixed_begin(), capacity_.pairs);
     if (transfer_.moves() != moves) device_->release_unused();
     is_ready_ = true;
   }
 
-  /// Divides n items among the parts, unless the division for an earlier number is good enough:
-  /// arrays are moved when it changes. @param each see range_of_part()
-  void divide(std::uint32_t n, std::uint32_t most_difference, std::uint32_t* each) const {
-    if (*each > 0 && is_divided(n, most_difference, *each)) return;
-    *each = std::max((n + data_.parts - 1) / data_.parts, std::uint32_t{1});
+  /// Divides the step among the devices, so that each has about as many contacts and bodies.
+  void divide() {
+    const BodyView& bodies = data_.step.bodies;
+    const bool has_numbers = has_stepped_ && data_.parts > 1;  // of the blocks in the last step
+    data_.parts = bodies.has_blocks ? device_->parts() : 1;
+    if (data_.parts > 1) {
+      if (has_numbers && !is_divided()) divide_contacts();
+      scale_divisions(bodies.capacity, bodies.count,
+                      data_.swept_bounds.sub_shapes.ranges.bounded());
+    }
+    device_->divide(data_.parts, data_.divisions);
   }
-  bool is_divided(std::uint32_t n, std::uint32_t most_difference, std::uint32_t each) const {
-    constexpr std::uint64_t kDivisor = 16;  // most_difference, or a sixteenth
-    const std::uint64_t divided = std::uint64_t{data_.parts} * each;
-    const std::uint64_t difference = n > divided ? n - divided : divided - n;
-    return data_.parts == 1 || difference <= std::max(n / kDivisor, std::uint64_t{most_difference});
+
+  /// Whether the division fits the step: pages are moved when it changes.
+  bool is_divided() const {
+    constexpr std::uint64_t kMostSteps = 256;
+    const auto is_close = [](std::uint64_t a, std::uint64_t b) {
+      const std::uint64_t difference = a > b ? a - b : b - a;
+      return difference <= std::max(b / 32, std::uint64_t{1024});
+    };
+    return data_.parts == 1 ||
+           (divided_.has_contacts && known_.completed < divided_.completed + kMostSteps &&
+            is_close(contact_count(), divided_.contacts) && is_close(pairs_, divided_.pairs) &&
+            is_close(blocks_.places, divided_.places));
+  }
+  std::uint64_t contact_count() const {
+    const ContactSizes& sizes = last_contacts().sizes();
+    return std::uint64_t{sizes.spheres} + sizes.manifolds;
+  }
+
+  /// Divides the slots by the contacts of the last step, and what belongs to the bodies by slots.
+  void divide_contacts() {
+    const ContactSizes& sizes = last_contacts().sizes();
+    const BodyView& bodies = data_.step.bodies;
+    const soft_step::ContactView contacts = last_contacts().view().view;
+    // Slot of body a of a contact. The longer list decides, because both are sorted by slot.
+    const bool by_spheres = sizes.spheres >= sizes.manifolds;
+    const std::uint32_t count = by_spheres ? sizes.spheres : sizes.manifolds;
+    const auto slot_of = [&](std::uint32_t i) {
+      return fetch(by_spheres ? &contacts.spheres[i].key.a : &contacts.manifolds[i].key.a);
+    };
+    const std::uint32_t* const sub_shape_body = data_.swept_bounds.sub_shapes.bodies;
+    const std::uint32_t sub_shapes = data_.swept_bounds.sub_shapes.ranges.bounded();
+    std::vector<std::uint32_t> first_bodies(bodies.capacity / kBodiesPerBlock + 1);
+    device_->download(first_bodies.data(), data_.first_of_block, first_bodies.size());
+    device_->wait();
+    Divisions& to = data_.divisions;
+    for (std::uint32_t part = 1; part < data_.parts; ++part) {
+      const std::uint64_t target =
+          (std::uint64_t{count} + bodies.capacity) * part / data_.parts;  // contacts and bodies
+      const std::uint32_t contact =
+          first_of(count, [&](std::uint32_t i) { return std::uint64_t{i} + slot_of(i) >= target; });
+      std::uint32_t slot = static_cast<std::uint32_t>(target - contact);
+      if (contact > 0) slot = std::max(slot, slot_of(contact - 1) + 1);
+      slot = std::min(slot, contact < count ? slot_of(contact) : bodies.capacity);
+      to.slots.begin[part] = slot;
+      to.contacts.begin[part] = by_spheres ? contact : sizes.spheres + contact;
+      to.pairs.begin[part] = first_of(pairs_, [&](std::uint32_t i) {
+        const std::uint32_t a = fetch(&data_.pairs[i].a);
+        return a >= sub_shapes || fetch(&sub_shape_body[a]) >= slot;
+      });
+      // Bodies without a place are in blocks in any order.
+      to.blocks.begin[part] =
+          blocks_.places > 0
+              ? static_cast<std::uint32_t>(std::ranges::count_if(
+                    first_bodies, [&](std::uint32_t body) { return body < slot; }))
+              : static_cast<std::uint32_t>(std::uint64_t{blocks_.all()} * slot / bodies.capacity);
+    }
+    divided_ = {true, known_.completed, contact_count(), pairs_, blocks_.places};
+    ++changes_;
+  }
+  /// Lowest i < n for which a condition holds that does not hold for lower ones and holds for all
+  /// higher ones; n if there is none.
+  template <class Condition>
+  static std::uint32_t first_of(std::uint32_t n, const Condition& condition) {
+    std::uint32_t begin = 0;
+    for (std::uint32_t end = n; begin < end;) {
+      const std::uint32_t middle = begin + (end - begin) / 2;
+      if (condition(middle)) {
+        end = middle;
+      } else {
+        begin = middle + 1;
+      }
+    }
+    return begin;
+  }
+  template <class T>
+  T fetch(const T* from) const {
+    T value;
+    device_->download(&value, from, 1);
+    device_->wait();
+    return value;
+  }
+
+  /// Sets the divisions that follow from those of slots and of blocks.
+  void scale_divisions(std::uint32_t slots, std::uint32_t bodies, std::uint32_t sub_shapes) {
+    Divisions& divisions = data_.divisions;
+    divisions.bodies = divisions.slots.scaled(slots, bodies);
+    divisions.sub_shapes = divisions.slots.scaled(slots, sub_shapes);
+    divisions.places = divisions.blocks.scaled(1, kBodiesPerBlock);
   }
 
   /// @param is_timed whether to mark the stages
@@ -493,7 +588,8 @@ class DeviceStep final : public DeviceWorld {
     Counters result;
     device_->download(&result, data_.counters, 1);
     device_->wait();
-    if (result.pairs > 0) pairs_ = result.pairs;
+    if (result.pairs > 0 && result.needed.pairs == 0) pairs_ = result.pairs;
+    if (result.failed == 0) blocks_ = result.blocks;
     return result;
   }
 
@@ -514,10 +610,7 @@ class DeviceStep final : public DeviceWorld {
       contacts_[now()].complete(progress.contacts[now()], data_.step.bodies.capacity);
       has_stepped_ = true;
     }
-    if (!is_divided(last_contacts().sizes().spheres, 1024, data_.contacts_of_part) ||
-        !is_divided(pairs_, 1024, data_.pairs_of_part)) {
-      is_ready_ = false;
-    }
+    if (has_stepped_ && !is_divided()) is_ready_ = false;
   }
 
   static Result result_of(const Counters& counters) {
@@ -574,9 +667,15 @@ class DeviceStep final : public DeviceWorld {
   std::uint64_t changes_ = 0;        ///< counts changes of program arguments, except addresses
   std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
   std::uint32_t pairs_ = 0;          ///< of swept bounds, in the last step
-  bool has_stepped_ = false;         ///< whether a step was completed since the upload
-  bool is_queued_ = false;           ///< whether the host has enqueued or captured steps
-  bool is_ready_ = false;            ///< whether all lists have the room of capacity_
+  BlockCounts blocks_;               ///< in the last step
+  /// The step by which the divisions were made.
+  struct {
+    bool has_contacts = false;  ///< whether there was one
+    std::uint64_t completed = 0, contacts = 0, pairs = 0, places = 0;
+  } divided_;
+  bool has_stepped_ = false;  ///< whether a step was completed since the upload
+  bool is_queued_ = false;    ///< whether the host has enqueued or captured steps
+  bool is_ready_ = false;     ///< whether all lists have the room of capacity_
   // Of edit().
   Buffer<EditedBody> edits_;
   Buffer<EditedMass> masses_;

@@ -39,7 +39,7 @@ struct MatchProgram {
         d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = i;
       }
     };
-    team.for_each(spheres + d.counters->manifolds, match, d.contacts_of_part);
+    team.for_each(spheres + d.counters->manifolds, match, &d.divisions.contacts);
     if (d.world_joints.count > 0) {
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) { match_joint(joint); });
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) {

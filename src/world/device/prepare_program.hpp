@@ -38,8 +38,11 @@ struct PrepareProgram {
         d.body_at[first + i] = d.unplaced[i];
         d.solver_index[d.unplaced[i]] = first + i;
       });
-      team.for_each(bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); });
-      team.for_each(blocks.indices(), [&](std::uint32_t i) { start(d.body_at[i], i); });
+      team.for_each(
+          bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); },
+          &d.divisions.bodies);
+      team.for_each(
+          blocks.indices(), [&](std::uint32_t i) { start(d.body_at[i], i); }, &d.divisions.places);
     } else {
       team.for_each(bodies.count, [&](std::uint32_t i) {
         const std::uint32_t body = bodies.ids[i].index;
@@ -53,10 +56,11 @@ struct PrepareProgram {
     team.sync();  // has_room() reads the numbers of rows of all blocks
     if (!has_room(team)) return;
     sort_overflow(team);
-    team.for_each_nowait(bodies.count, [&](std::uint32_t i) {
+    const auto sort_fixed_of = [&](std::uint32_t i) {
       const std::uint32_t body = bodies.ids[i].index;
       if (bodies.movable(body)) sort_fixed(d.index_of(body));
-    });
+    };
+    team.for_each_nowait(bodies.count, sort_fixed_of, &d.divisions.bodies);
     const RowBins& rows = d.bins[team.part()];
     team.team_of_part().for_each_nowait(rows.begin[kBins] - rows.begin[0], [&](std::uint32_t i) {
       fill_row(rows, rows.begin[0] + i);
@@ -120,7 +124,7 @@ struct PrepareProgram {
           const soft_step::ContactKey key = setup.key(i);
           const std::uint32_t body =
               group == soft_step::kFixedGroup ? setup.movable_body(key) : key.a;
-          return part_of(d.index_of(body) / kBodiesPerBlock, d.parts, d.blocks_of_part);
+          return part_of(d.index_of(body) / kBodiesPerBlock, d.parts, d.divisions.blocks);
         },
         [&](std::uint32_t i, std::uint32_t row, std::uint16_t bin) {
           if (!has_memory(row)) return;
@@ -135,7 +139,7 @@ struct PrepareProgram {
             atomic_or(&d.row_bodies[d.index_of(key.b)].colors, bit);
           }
         },
-        d.contacts_of_part);
+        &d.divisions.contacts);
     team.for_each_nowait(d.parts * kBins, [&](std::uint32_t i) { note_bin(i / kBins, i % kBins); });
   }
 
@@ -227,7 +231,7 @@ struct PrepareProgram {
       threads.sync();
       fill_inner_rows(threads, setup, block, rows, soft_step::RowTypes());
     };
-    team.for_blocks(blocks.all(), place, data.blocks_of_part);
+    team.for_blocks(blocks.all(), place, &data.divisions.blocks);
   }
 
   static constexpr soft_step::RowKind kSphere = soft_step::kKindOf<soft_step::SphereRow>;

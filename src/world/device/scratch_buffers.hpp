@@ -50,12 +50,14 @@ class ScratchBuffers {
   void reserve_sub_shapes(const Transfer<Device>& transfer, const SubShapeRanges& ranges,
                           StepData* data) {
     const std::size_t boxes = ranges.fixed_begin() - ranges.spheres();
-    data->swept_bounds.margins = transfer.room_to_grow(&margins_, ranges.bounded());
-    data->swept_bounds.swept = transfer.room_to_grow(&swept_, ranges.bounded());
-    if (transfer.parts() > 1) {
-      data->searched = transfer.room_to_grow(&searched_, ranges.bounded(), kOfSearch);
+    const PageLayout layout{.index = ArrayIndex::sub_shape};
+    data->swept_bounds.margins = transfer.room_to_grow(&margins_, ranges.bounded(), layout);
+    data->swept_bounds.swept = transfer.room_to_grow(&swept_, ranges.bounded(), layout);
+    if (transfer.parts() > 1) {  // the first device searches
+      data->searched =
+          transfer.room_to_grow(&searched_, ranges.bounded(), {.index = ArrayIndex::of_first});
     }
-    data->swept_bounds.boxes = transfer.room_to_grow(&boxes_, boxes);
+    data->swept_bounds.boxes = transfer.room_to_grow(&boxes_, boxes, kEqual);
   }
 
   /// Reserves the lists. Sets StepData::capacity.
@@ -64,47 +66,47 @@ class ScratchBuffers {
     Capacity& c = d.capacity = capacity;
     c.indices = static_cast<std::uint32_t>(
         may_have_blocks_ ? std::max(std::size_t{capacity.indices}, usual_index_count()) : slots_);
-    const std::size_t shared = std::size_t{d.parts} * d.blocks_of_part * kBodiesPerBlock;
-    reserve_solver(transfer, c.indices, PageLayout::of(shared, c.indices).used, data);
+    reserve_solver(transfer, c.indices, data);
     const std::size_t contacts = std::size_t{c.spheres} + c.candidates;
     const std::size_t all_rows = contacts + d.world_joints.count;
     const std::size_t rows_of_part =
         d.parts == 1 ? all_rows : std::max<std::size_t>(c.rows, all_rows / d.parts * 9 / 8 + 64);
     const std::size_t rows = d.parts * rows_of_part;
     d.row_capacity = static_cast<std::uint32_t>(rows_of_part);
-    const std::size_t shared_contacts = std::size_t{d.parts} * d.contacts_of_part;
-    const PageLayout by_contact = PageLayout::of(shared_contacts, all_rows);
-    const PageLayout by_pair = PageLayout::of(std::size_t{d.parts} * d.pairs_of_part, c.pairs);
+    const PageLayout by_contact{.index = ArrayIndex::contact}, by_pair{.index = ArrayIndex::pair};
     d.pairs = transfer.room(&pairs_, c.pairs, by_pair);
     d.pair_found = transfer.room(&pair_found_, c.pairs, by_pair);
     d.pair_results = transfer.room(&pair_results_, c.pairs, by_pair);
-    d.candidates = transfer.room(&candidates_, c.candidates);
-    d.tested = transfer.room(&tested_, c.candidates);
-    d.next_candidate = transfer.room(&next_candidate_, c.candidates);
+    d.candidates = transfer.room(&candidates_, c.candidates, kEqual);
+    d.tested = transfer.room(&tested_, c.candidates, kEqual);
+    d.next_candidate = transfer.room(&next_candidate_, c.candidates, kEqual);
     d.uncolored = transfer.room(&uncolored_, all_rows, by_contact);
-    d.still_uncolored = transfer.room(&still_uncolored_, all_rows);
+    d.still_uncolored = transfer.room(&still_uncolored_, all_rows, kEqual);
     d.row_of = d.uncolored;
     d.row_bins = transfer.room(&row_bins_, all_rows, by_contact);
-    d.bin_sizes = transfer.room(&bin_sizes_, kMostParts * (kBins + 1));
-    d.bins = transfer.room(&bins_, kMostParts);
-    d.row_contact = transfer.room(&row_contact_, rows);
-    d.next_fixed = transfer.room(&next_fixed_, rows);
-    d.next_inner_joint = transfer.room(&next_inner_joint_, d.world_joints.count);
-    d.overflow = transfer.room(&overflow_, all_rows);
-    d.sphere_rows = {transfer.room(&sphere_rows_, rows, columns_of<soft_step::SphereRow>()), rows};
+    d.bin_sizes = transfer.room(&bin_sizes_, kMostParts * (kBins + 1), kEqual);
+    d.bins = transfer.room(&bins_, kMostParts, kEqual);
+    d.row_contact = transfer.room(&row_contact_, rows, kEqual);
+    d.next_fixed = transfer.room(&next_fixed_, rows, kEqual);
+    d.next_inner_joint = transfer.room(&next_inner_joint_, d.world_joints.count, kEqual);
+    d.overflow = transfer.room(&overflow_, all_rows, kEqual);
+    d.sphere_rows = {transfer.room(&sphere_rows_, rows,
+                                   columns_of<soft_step::SphereRow>(ArrayIndex::equal, rows)),
+                     rows};
     if (may_have_blocks_) {
       std::size_t count = 0;
       for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
         count += d.parts * std::size_t{d.capacity_of(kind)};
       }
-      std::uint32_t* next = transfer.room(&inner_contacts_, count);
+      std::uint32_t* next = transfer.room(&inner_contacts_, count, kEqual);
       for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
         d.inner_contacts[kind] = next;
         next += d.parts * std::size_t{d.capacity_of(kind)};
       }
     }
-    d.manifold_rows = transfer.room(&manifold_rows_, d.parts * std::size_t{c.manifold_rows});
-    d.point_rows = transfer.room(&point_rows_, d.parts * std::size_t{c.row_points});
+    d.manifold_rows =
+        transfer.room(&manifold_rows_, d.parts * std::size_t{c.manifold_rows}, kEqual);
+    d.point_rows = transfer.room(&point_rows_, d.parts * std::size_t{c.row_points}, kEqual);
   }
 
  private:
@@ -114,17 +116,21 @@ class ScratchBuffers {
     return slots_ + kBodiesPerBlock + slots_ / partition::kBodiesPerBodyWithoutPlace;
   }
 
+  static constexpr PageLayout kEqual{.index = ArrayIndex::equal};
+
   /// Reserves the arrays by solver index. @param n number of indices
-  /// @param used fraction of them that bodies have
-  void reserve_solver(const Transfer<Device>& transfer, std::size_t n, double used,
-                      StepData* data) {
+  void reserve_solver(const Transfer<Device>& transfer, std::size_t n, StepData* data) {
     StepData& d = *data;
-    const PageLayout layout{.used = used};
-    d.columns = {transfer.room(&cells_, n * CellColumns::kColumns, cell_layout(used)), n};
+    constexpr ArrayIndex kPlace = ArrayIndex::place;
+    const PageLayout layout{.index = kPlace};
+    // The velocities are one array of a world with blocks (BodyMotion).
+    const PageLayout of_cells{
+        .index = kPlace, .columns = CellColumns::kColumns, .first_width = 2, .items = n};
+    d.columns = {transfer.room(&cells_, n * CellColumns::kColumns, of_cells), n};
     d.row_bodies = transfer.room(&row_bodies_, n, layout);
     d.balls = transfer.room(&balls_, n, layout);
     d.substep_bodies = {
-        transfer.room(&substep_bodies_, n, columns_of<soft_step::SubstepBody>(used)), n};
+        transfer.room(&substep_bodies_, n, columns_of<soft_step::SubstepBody>(kPlace, n)), n};
     d.first_fixed = transfer.room(&first_fixed_, n, layout);
     d.codes = codes_in(d.columns.cells, n);
     if (!may_have_blocks_) return;
@@ -132,16 +138,10 @@ class ScratchBuffers {
     transfer.room(&orientation_by_index_, n, layout);
   }
 
-  /// Layout of the input of the search, which the first device performs.
-  static constexpr PageLayout kOfSearch{.is_shared = false};
-  /// Layout of a StripedArray.
+  /// Layout of a StripedArray of n items.
   template <class T>
-  static PageLayout columns_of(double used = 1) {
-    return {.columns = StripedArray<T>::kPieces, .used = used};
-  }
-  /// Layout of CellColumns, whose velocities are one array of a world with blocks (BodyMotion).
-  static PageLayout cell_layout(double used) {
-    return {.columns = CellColumns::kColumns, .first_width = 2, .used = used};
+  static PageLayout columns_of(ArrayIndex index, std::size_t n) {
+    return {.index = index, .columns = StripedArray<T>::kPieces, .items = n};
   }
 
   /// Reserves the arrays of worlds with several blocks. @param n number of slots
@@ -151,10 +151,11 @@ class ScratchBuffers {
     d.unplaced = transfer.room(&unplaced_, n);
     const std::size_t blocks = n / kBodiesPerBlock + 1;
     constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
-    d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds);
-    d.first_inner_joint = transfer.room(&first_inner_joint_, blocks);
-    d.first_of_block = transfer.room(&first_of_block_, blocks);
-    d.block_number = transfer.room(&block_number_, blocks);
+    const PageLayout layout{.index = ArrayIndex::block, .items = blocks};
+    d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds, layout);
+    d.first_inner_joint = transfer.room(&first_inner_joint_, blocks, layout);
+    d.first_of_block = transfer.room(&first_of_block_, blocks, kEqual);
+    d.block_number = transfer.room(&block_number_, blocks, kEqual);
   }
 
   static SortedCodes codes_in(VectorCells* memory, std::size_t n) {

@@ -35,22 +35,76 @@ struct Range {
   std::uint32_t begin = 0, end = 0;
 };
 
-/// The share of a part in n items: consecutive items, in the order of parts.
-/// @param each number of items of each part but the last one; 0: all parts have about as many
+/// The shares of the parts in the items of a list: consecutive items, in the order of parts.
+struct Division {
+  /// By part: its first item, ascending from 0.
+  std::uint32_t begin[kMostParts] = {};
+
+  /// Gives each part as many of n items.
+  static Division equal(std::uint32_t n, std::uint32_t parts) {
+    Division division;
+    for (std::uint32_t part = 0; part < parts; ++part) {
+      division.begin[part] = static_cast<std::uint32_t>(std::uint64_t{n} * part / parts);
+    }
+    return division;
+  }
+  /// The same division of `to` items instead of `from` ones.
+  Division scaled(std::uint64_t from, std::uint64_t to) const {
+    Division division;
+    for (std::uint32_t part = 0; part < kMostParts; ++part) {
+      const std::uint64_t item = from == 0 ? 0 : begin[part] * to / from;
+      division.begin[part] = static_cast<std::uint32_t>(item);
+    }
+    return division;
+  }
+};
+/// The divisions of a step by several parts. A part has the bodies of consecutive slots, and what
+/// belongs to them, so that most memory that it uses is its own.
+struct Divisions {
+  Division slots, bodies, sub_shapes, places, blocks, contacts, pairs;
+
+  /// @returns null for an array that is not divided so
+  const Division* of(ArrayIndex index) const {
+    switch (index) {
+      case ArrayIndex::slot:
+        return &slots;
+      case ArrayIndex::body:
+        return &bodies;
+      case ArrayIndex::sub_shape:
+        return &sub_shapes;
+      case ArrayIndex::place:
+        return &places;
+      case ArrayIndex::block:
+        return &blocks;
+      case ArrayIndex::contact:
+        return &contacts;
+      case ArrayIndex::pair:
+        return &pairs;
+      case ArrayIndex::equal:
+      case ArrayIndex::of_first:
+        break;
+    }
+    return nullptr;
+  }
+};
+
+/// The share of a part in n items. @param division null: all parts have about as many
 JFPX_HD inline Range range_of_part(std::uint32_t n, std::uint32_t part, std::uint32_t parts,
-                                   std::uint32_t each = 0) {
+                                   const Division* division = nullptr) {
   if (parts == 1) return {0, n};
   const auto first = [&](std::uint32_t p) {
     if (p == parts) return n;
-    if (each == 0) return static_cast<std::uint32_t>(std::uint64_t{n} * p / parts);
-    return n / each < p ? n : p * each;
+    if (division == nullptr) return static_cast<std::uint32_t>(std::uint64_t{n} * p / parts);
+    return division->begin[p] < n ? division->begin[p] : n;
   };
   return {first(part), first(part + 1)};
 }
-/// The part of an item; see range_of_part(). @param each not 0
-JFPX_HD inline std::uint32_t part_of(std::uint32_t item, std::uint32_t parts, std::uint32_t each) {
-  if (parts == 1) return 0;
-  return item / each < parts ? item / each : parts - 1;
+/// The part that has an item.
+JFPX_HD inline std::uint32_t part_of(std::uint32_t item, std::uint32_t parts,
+                                     const Division& division) {
+  std::uint32_t part = 0;
+  while (part + 1 < parts && item >= division.begin[part + 1]) ++part;
+  return part;
 }
 
 /// The blocks of a world.
@@ -245,9 +299,7 @@ struct StepData {
   /// Number of devices that share the step, each with its part of the rows; 1 in a world of one
   /// block. No result depends on it.
   std::uint32_t parts = 1;
-  /// Number of pairs of swept bounds, of contacts, and of blocks of bodies whose memory each part
-  /// but the last one has, if there are several parts.
-  std::uint32_t pairs_of_part = 0, contacts_of_part = 0, blocks_of_part = 0;
+  Divisions divisions;  ///< if there are several parts
 
   Vec3* motion = nullptr;              ///< by body
   SphereInstance* searched = nullptr;  ///< copy of the swept bounds, if there are several parts

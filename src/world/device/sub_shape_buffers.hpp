@@ -26,14 +26,15 @@ class SubShapeBuffers {
     ranges_ = from.ranges;
     part_count_ = static_cast<std::uint32_t>(part_count);
     part_room_ = 2 * part_count + 1024;
-    transfer.put(&bodies_, from.bodies, ranges_.all());
-    transfer.put(&numbers_, from.numbers, ranges_.all());
-    transfer.put(&bounds_, from.all_bounds, bounded);
+    constexpr ArrayIndex kIndex = ArrayIndex::sub_shape;
+    transfer.put(&bodies_, from.bodies, ranges_.all(), 0, kIndex);
+    transfer.put(&numbers_, from.numbers, ranges_.all(), 0, kIndex);
+    transfer.put(&bounds_, from.all_bounds, bounded, 0, kIndex);
     const std::size_t solids = bounded - ranges_.spheres();
     transfer.put(&solids_, hulls->on_device(transfer, from.solids, solids, &solids_on_device_),
                  solids);
     transfer.put(&walls_, from.walls, ranges_.all() - bounded);
-    transfer.put(&parts_, from.parts, bounded);
+    transfer.put(&parts_, from.parts, bounded, 0, kIndex);
     transfer.put(&local_, from.local, part_count, part_room_);
   }
 
@@ -44,13 +45,14 @@ class SubShapeBuffers {
     const std::size_t all = most.all(), bounded = most.bounded();
     part_count_ = a.part_count_ + b.part_count_;
     part_room_ = a.part_room_;
+    const PageLayout layout{.index = ArrayIndex::sub_shape};
     return {
-        .bodies = transfer.room_to_grow(&bodies_, all),
-        .numbers = transfer.room_to_grow(&numbers_, all),
-        .bounds = transfer.room_to_grow(&bounds_, bounded),
+        .bodies = transfer.room_to_grow(&bodies_, all, layout),
+        .numbers = transfer.room_to_grow(&numbers_, all, layout),
+        .bounds = transfer.room_to_grow(&bounds_, bounded, layout),
         .solids = transfer.room_to_grow(&solids_, bounded - most.spheres()),
         .walls = transfer.room_to_grow(&walls_, all - bounded),
-        .parts = transfer.room_to_grow(&parts_, bounded),
+        .parts = transfer.room_to_grow(&parts_, bounded, layout),
         .local = transfer.room_to_grow(&local_, std::max<std::size_t>(part_room_, part_count_))};
   }
   void complete(const SubShapeRanges& ranges) { ranges_ = ranges; }

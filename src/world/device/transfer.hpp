@@ -26,9 +26,11 @@ class Transfer {
   /// Copies an array to the device. @returns its address there
   /// @param room number of items to reserve memory for, if it is above `count`
   template <class T>
-  const T* put(Buffer<T>* to, const T* from, std::size_t count, std::size_t room = 0) const {
+  const T* put(Buffer<T>* to, const T* from, std::size_t count, std::size_t room = 0,
+               ArrayIndex index = ArrayIndex::slot) const {
     note_move(to, [&] {
-      device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world", {});
+      device_->reserve(to, std::max({count, room, std::size_t{1}}), "the bodies of a world",
+                       {.index = index});
     });
     device_->upload(to->data(), from, count);
     return to->data();
@@ -52,11 +54,6 @@ class Transfer {
                                layout);
     });
     return buffer->data();
-  }
-  /// Whether room() would keep the contents.
-  template <class T>
-  bool fits(const Buffer<T>& buffer, std::size_t count, const PageLayout& layout) const {
-    return device_->fits(buffer, count, layout);
   }
   /// Largest number of devices that share an array.
   std::uint32_t parts() const { return device_->parts(); }
