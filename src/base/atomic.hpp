@@ -86,6 +86,41 @@ JFPX_HD inline void atomic_or(std::uint64_t* at, std::uint64_t bits) {
 #endif
 }
 
+/// Appends items to a list whose size is in the memory of any device. The active threads of a warp,
+/// all of which must append to the same list, share one atomic operation.
+/// @returns the number of the first item
+JFPX_HD inline std::uint32_t append(std::uint32_t* size, std::uint32_t count) {
+#if defined(__CUDA_ARCH__)
+  const unsigned lanes = __activemask();
+  const int lane = static_cast<int>(threadIdx.x % 32), first = __ffs(static_cast<int>(lanes)) - 1;
+  std::uint32_t before = 0, all = 0;
+  for (unsigned left = lanes; left != 0; left &= left - 1) {
+    const int other = __ffs(static_cast<int>(left)) - 1;
+    const std::uint32_t of_other = __shfl_sync(lanes, count, other);
+    if (other < lane) before += of_other;
+    all += of_other;
+  }
+  const std::uint32_t at = lane == first ? atomic_add(size, all) : 0;
+  return __shfl_sync(lanes, at, first) + before;
+#else
+  return atomic_add(size, count);
+#endif
+}
+/// Appends an item.
+JFPX_HD inline std::uint32_t append(std::uint32_t* size) {
+#if defined(__CUDA_ARCH__)
+  const unsigned lanes = __activemask(), lane = threadIdx.x % 32;
+  const int first = __ffs(static_cast<int>(lanes)) - 1;
+  const std::uint32_t at = static_cast<int>(lane) == first
+                               ? atomic_add(size, static_cast<std::uint32_t>(__popc(lanes)))
+                               : 0;
+  return __shfl_sync(lanes, at, first) +
+         static_cast<std::uint32_t>(__popc(lanes & ((1u << lane) - 1)));
+#else
+  return atomic_add(size, 1);
+#endif
+}
+
 /// @returns the value before
 JFPX_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)

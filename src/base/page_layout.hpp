@@ -19,6 +19,7 @@ enum class ArrayIndex : std::uint8_t {
   place,      ///< solver index of a body
   block,      ///< number of a block of bodies
   contact,    ///< number of a contact
+  manifold,   ///< number of a manifold
   pair,       ///< number of a pair of swept bounds
   equal,      ///< any other: each device has as many items
   of_first    ///< any other: the first device has the array

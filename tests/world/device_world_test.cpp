@@ -638,15 +638,15 @@ TEST(DeviceWorld, PartsHaveAsManyContactsAndBodies) {
   const std::span<const Contact> contacts = world.contacts();
   const auto of_first = static_cast<std::uint64_t>(
       std::ranges::count_if(contacts, [&](const Contact& c) { return c.a.index < slots; }));
-  const double all = static_cast<double>(contacts.size() + scene.bodies.size());
+  const double all = static_cast<double>(2 * contacts.size() + 5 * scene.bodies.size());
   EXPECT_GT(contacts.size(), scene.bodies.size());
-  EXPECT_NEAR(static_cast<double>(of_first + slots) / all, 0.5, 0.02);
+  EXPECT_NEAR(static_cast<double>(2 * of_first + 5 * slots) / all, 0.5, 0.02);
   EXPECT_EQ(divisions.bodies.begin[1], slots);
   EXPECT_EQ(divisions.sub_shapes.begin[1], slots);
   const auto is_close = [](std::uint64_t value, std::uint64_t expected) {
     return value > expected - expected / 20 && value < expected + expected / 20;
   };
-  EXPECT_PRED2(is_close, divisions.contacts.begin[1], of_first);
+  EXPECT_PRED2(is_close, divisions.spheres.begin[1], of_first);
   EXPECT_PRED2(is_close, divisions.pairs.begin[1], of_first);
   EXPECT_NEAR(divisions.places.begin[1], slots, soft_step::kBodiesPerBlock);
 }

@@ -181,13 +181,19 @@ class HostTeam {
     return total;
   }
   template <class BinOf, class PartOf, class Place>
-  void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* sizes, device::RowBins* begin,
-                 std::uint32_t capacity, const BinOf& bin_of, const PartOf& part_of,
-                 const Place& place, const device::Division* division) const {
+  void partition(const device::TwoLists& lists, std::uint16_t* bins,
+                 device::PartState* const* states, device::RowBins* begin, std::uint32_t capacity,
+                 const BinOf& bin_of, const PartOf& part_of, const Place& place) const {
     constexpr std::uint32_t kStride = device::kBins + 1;
-    const device::Range mine = device::range_of_part(n, part_, parts_, division);
+    std::vector<std::uint32_t> items;
+    const auto add = [&](std::uint32_t n, const device::Division* division, std::uint32_t offset) {
+      const device::Range mine = device::range_of_part(n, part_, parts_, division);
+      for (std::uint32_t i = mine.begin; i < mine.end; ++i) items.push_back(offset + i);
+    };
+    add(lists.first, lists.division_of_first, 0);
+    add(lists.second, lists.division_of_second, lists.first);
     std::vector<std::uint32_t> next(parts_ * kStride);
-    for (std::uint32_t i = mine.begin; i < mine.end; ++i) {
+    for (const std::uint32_t i : items) {
       std::uint32_t bin = bin_of(i);
       if (bin < device::kBins) {
         if (parts_ > 1) bin += part_of(i, static_cast<std::uint16_t>(bin)) * kStride;
@@ -196,20 +202,23 @@ class HostTeam {
       bins[i] = static_cast<std::uint16_t>(bin);
     }
     for (std::uint32_t b = 0; b < parts_ * kStride; ++b) {
-      if (next[b] > 0) next[b] = atomic_add(&sizes[b], next[b]);
+      if (next[b] > 0) next[b] = atomic_add(&states[part_]->bin_sizes[b], next[b]);
     }
     sync();
     for (std::uint32_t part = 0; part < parts_; ++part) {
       std::uint32_t first = part * capacity;
       for (std::uint32_t b = 0; b < kStride; ++b) {
-        next[part * kStride + b] += first;
         if (part_ == 0) begin[part].begin[b] = first;
-        first += sizes[part * kStride + b];
+        for (std::uint32_t from = 0; from < parts_; ++from) {
+          if (from == part_) next[part * kStride + b] += first;
+          first += states[from]->bin_sizes[part * kStride + b];
+        }
       }
     }
-    for (std::uint32_t i = mine.end; i-- > mine.begin;) {
+    std::ranges::reverse(items);
+    for (const std::uint32_t i : items) {
       const std::uint32_t bin = bins[i];
-      if (bin != soft_step::kNoBin) {
+      if (bin < device::kMostParts * kStride) {
         place(i, next[bin]++, static_cast<std::uint16_t>(bin % kStride));
       }
     }
@@ -236,7 +245,8 @@ class HostTeam {
 
 class HostDevice {
  public:
-  explicit HostDevice(std::uint32_t parts = 1) : parts_(parts), shared_(1), shared_by_all_(parts) {}
+  explicit HostDevice(std::uint32_t parts = 1)
+      : parts_(parts), states_(parts), shared_(1), shared_by_all_(parts) {}
 
   template <class T>
   class Buffer {
@@ -257,6 +267,7 @@ class HostDevice {
 
   int number() const { return 0; }
   std::uint32_t parts() const { return parts_; }
+  device::PartState* part_state(std::uint32_t part) { return &states_[part]; }
   void divide(std::uint32_t, const device::Divisions& divisions) { divisions_ = divisions; }
   const device::Divisions& divisions() const { return divisions_; }  ///< of the last step
   cuda::Stream stream() const { return nullptr; }
@@ -345,7 +356,9 @@ class HostDevice {
     std::vector<std::thread> others;
     const auto run_part = [&](std::uint32_t part) {
       if (part == runs_ % parts) std::this_thread::sleep_for(std::chrono::microseconds(20));
-      program(HostTeam(&shared_by_all_, part, parts, seed + part));
+      Program mine = program;
+      mine.data.part = part;
+      mine(HostTeam(&shared_by_all_, part, parts, seed + part));
     };
     for (std::uint32_t part = 1; part < parts; ++part) others.emplace_back(run_part, part);
     run_part(0);
@@ -354,6 +367,7 @@ class HostDevice {
 
   std::uint32_t parts_;
   device::Divisions divisions_;
+  std::vector<device::PartState> states_;
   HostTeam::Shared shared_, shared_by_all_;
   std::uint64_t runs_ = 0;
   int runs_left_ = -1;

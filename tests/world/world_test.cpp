@@ -54,7 +54,9 @@ TEST(World, RefusesDevicesThatCannotShareIt) {
   };
   refuse(Scene{}, {.collider = {.backend = Backend::cpu}, .devices = {0, 1}},
          "there are 2 devices, and the backend is cpu; it must be cuda or automatic");
-  refuse(Scene{.solver = Solver::worst_first}, {.devices = {0}},
+  Scene of_thesis;
+  of_thesis.solver = Solver::worst_first;
+  refuse(of_thesis, {.devices = {0}},
          "there are 1 devices, and the solver is worst_first; it must be soft_step");
   refuse(Scene{}, {.devices = std::vector<int>(9)}, "there are 9 devices; at most 8 share a world");
 }

@@ -108,7 +108,7 @@ MappedMemory::MappedMemory(const std::vector<int>& devices, std::size_t bytes,
 MappedMemory::~MappedMemory() { release(); }
 
 void MappedMemory::move(const std::vector<int>& devices, const std::vector<std::uint32_t>& parts,
-                        const char* what) {
+                        const char* what, cudaStream_t stream) {
   const bool is_moved = std::ranges::any_of(pieces_, [&](const Piece& piece) {
     for (std::size_t page = piece.begin / kPage; page < piece.end / kPage; ++page) {
       if (devices[parts[page]] != piece.device) return true;
@@ -117,14 +117,23 @@ void MappedMemory::move(const std::vector<int>& devices, const std::vector<std::
   });
   if (!is_moved) return;
   MappedMemory moved(devices, bytes_, parts, what);
-  JFPX_CUDA_TRY(cudaMemcpy(moved.data_, data_, bytes_, cudaMemcpyDeviceToDevice));
-  JFPX_CUDA_TRY(cudaDeviceSynchronize());
+  for (const int device : devices_) {
+    const DeviceGuard guard(device);
+    JFPX_CUDA_TRY(cudaDeviceSynchronize());  // programs may read the array on any device
+  }
+  JFPX_CUDA_TRY(cudaMemcpyAsync(moved.data_, data_, bytes_, cudaMemcpyDeviceToDevice, stream));
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream));
   unmap();
   moved.unmap();
   pieces_.swap(moved.pieces_);
-  if (const CUresult result = map(); result != CUDA_SUCCESS) {
-    throw_allocation_error(runtime_error(result), bytes_, what, "cuMemMap", __FILE__, __LINE__);
+  const CUresult result = map();
+  if (result == CUDA_SUCCESS) return;
+  unmap();
+  pieces_.swap(moved.pieces_);
+  if (map() != CUDA_SUCCESS) {
+    throw DeviceError(std::string("the memory for ") + what + " can no longer be accessed");
   }
+  throw_allocation_error(runtime_error(result), bytes_, what, "cuMemMap", __FILE__, __LINE__);
 }
 
 CUresult MappedMemory::map() {

@@ -18,8 +18,8 @@ namespace cuda {
 void share(const MemoryPool& pool, const std::vector<int>& devices);
 
 /// Owner of a range of addresses that several devices access. Each page is in the memory of one of
-/// them (CUDA's virtual memory management). Not in stream order: move() and the destructor must not
-/// be called while a device uses the memory.
+/// them (CUDA's virtual memory management). Not in stream order: the destructor must not be called
+/// while a device uses the memory.
 class MappedMemory {
  public:
   MappedMemory() = default;
@@ -35,10 +35,11 @@ class MappedMemory {
     return *this;
   }
   void* data() const noexcept { return data_; }
-  /// Moves pages to other devices. Addresses and contents do not change. Waits for the copies.
+  /// Moves pages to other devices. Addresses and contents do not change. If a page moves, waits for
+  /// all work of the devices, and for the copies in the stream, which is of the current device.
   /// @throws OutOfMemory, without effect, DeviceError
   void move(const std::vector<int>& devices, const std::vector<std::uint32_t>& parts,
-            const char* what);
+            const char* what, cudaStream_t stream);
 
   /// Bytes of a page. Smaller arrays should be on one device.
   static constexpr std::size_t kPage = std::size_t{2} << 20;

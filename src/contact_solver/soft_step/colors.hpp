@@ -50,7 +50,7 @@ JFPX_HD constexpr std::uint32_t number_in_class(std::uint32_t color) {
 }
 
 /// The colors of a body: a set of numbers for each class.
-struct UsedColors {
+struct alignas(16) UsedColors {
   std::uint64_t inner = 0, crossing = 0;
 
   JFPX_HD constexpr std::uint64_t& of_class(bool is_inner) { return is_inner ? inner : crossing; }

@@ -34,7 +34,7 @@ struct OwnMaterial {
 };
 
 /// Two spheres that touch, or that may touch during the step.
-struct SphereContactInput {
+struct alignas(16) SphereContactInput {
   ContactKey key;
   Vec3 normal;        ///< unit, from b to a
   Real distance = 0;  ///< [m], along the normal; > 0: a gap
@@ -59,7 +59,7 @@ struct ManifoldInput {
 using PointInput = detail::SolverPoint;
 
 /// Impulses of a contact point on body a [N s], in world axes.
-struct KeptImpulse {
+struct alignas(16) KeptImpulse {
   Vec3 friction;
   Real normal = 0;  ///< >= 0, or kReleased
   /// `normal` of bodies that pushed each other during the step, but not at its end

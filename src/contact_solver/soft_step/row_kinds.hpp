@@ -76,8 +76,7 @@ JFPX_HD constexpr std::uint32_t group_of_crossing(std::uint32_t number) { return
 
 /// Rows are sorted into bins by kind, then by group.
 inline constexpr std::uint32_t kBins = kRowKinds * kGroups;
-inline constexpr std::uint16_t kNoBin = 0xffff;
-static_assert(kRowKinds < kNoRow && kBins < kNoBin);
+static_assert(kRowKinds < kNoRow);
 JFPX_HD constexpr std::uint16_t bin_of(std::uint32_t kind, std::uint32_t group) {
   return static_cast<std::uint16_t>(kind * kGroups + group);
 }

@@ -310,28 +310,37 @@ class GridTeam {
 #endif
   }
 
-  /// Calls place(i, position, bin) for all i < n with bin_of(i) < device::kBins. The positions of a
-  /// part are consecutive, ascend by bin, and start at a multiple of `capacity`. The order within a
-  /// bin is arbitrary.
+  /// Calls place(i, position, bin) for all items i with bin_of(i) < device::kBins. The positions of
+  /// a part are consecutive, ascend by bin, and start at a multiple of `capacity`. The order within
+  /// a bin is arbitrary.
   /// Uses kPartitionBytes of the shared memory of a block.
-  /// @param bins   receives part * (kBins + 1) + bin for each item, or kNoBin
-  /// @param sizes  by part, kBins + 1 numbers each, which must be 0; receives the sizes of the bins
+  /// @param lists  two lists of items, each of which is divided among the blocks of the launch
+  /// @param bins   receives for each item part * (kBins + 1) + bin, or what bin_of() returns if it
+  ///   is not a bin
+  /// @param states by part, with bin_sizes of 0, which receive the sizes
   /// @param begin  by part, receives the first position of each bin, and the end
   /// @param bin_of called once for each item
   /// @param part_of called once for each item that has a bin
   template <class BinOf, class PartOf, class Place>
-  JFPX_HD void partition(std::uint32_t n, std::uint16_t* bins, std::uint32_t* sizes,
-                         device::RowBins* begin, std::uint32_t capacity, const BinOf& bin_of,
-                         const PartOf& part_of, const Place& place,
-                         const device::Division* division) const {
+  JFPX_HD void partition(const device::TwoLists& lists, std::uint16_t* bins,
+                         device::PartState* const* states, device::RowBins* begin,
+                         std::uint32_t capacity, const BinOf& bin_of, const PartOf& part_of,
+                         const Place& place) const {
 #if defined(__CUDA_ARCH__)
     constexpr std::uint32_t kStride = device::kBins + 1;
-    static_assert(device::kMostParts * kStride < soft_step::kNoBin);
     auto* const next = static_cast<std::uint32_t*>(Threads().shared(kPartitionBytes));
-    const device::Range chunk = chunk_of(n, division);
+    const device::Range of_first = chunk_of(lists.first, lists.division_of_first),
+                        of_second = chunk_of(lists.second, lists.division_of_second);
+    const std::uint32_t first_count = of_first.end - of_first.begin,
+                        count = first_count + of_second.end - of_second.begin;
+    const auto item = [&](std::uint32_t k) {
+      return k < first_count ? of_first.begin + k
+                             : lists.first + of_second.begin + (k - first_count);
+    };
     for (std::uint32_t b = threadIdx.x; b < parts_ * kStride; b += kThreads) next[b] = 0;
     __syncthreads();
-    for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
+    for (std::uint32_t k = threadIdx.x; k < count; k += kThreads) {
+      const std::uint32_t i = item(k);
       std::uint16_t bin = bin_of(i);
       if (bin < device::kBins) {
         if (parts_ > 1) bin += static_cast<std::uint16_t>(part_of(i, bin) * kStride);
@@ -341,7 +350,7 @@ class GridTeam {
     }
     __syncthreads();
     for (std::uint32_t b = threadIdx.x; b < parts_ * kStride; b += kThreads) {
-      if (next[b] > 0) next[b] = atomic_add(&sizes[b], next[b]);
+      if (next[b] > 0) next[b] = atomic_add(&states[part_]->bin_sizes[b], next[b]);
     }
     sync();
     for (std::uint32_t part = 0; part < parts_; ++part) {
@@ -349,18 +358,23 @@ class GridTeam {
       for (std::uint32_t tile = 0; tile < kStride; tile += kThreads) {
         const std::uint32_t b = tile + threadIdx.x;
         std::uint32_t sum = 0;
-        const std::uint32_t size = b < kStride ? sizes[part * kStride + b] : 0;
+        std::uint32_t size = 0, of_lower_parts = 0;
+        for (std::uint32_t from = 0; from < parts_ && b < kStride; ++from) {
+          if (from == part_) of_lower_parts = size;
+          size += states[from]->bin_sizes[part * kStride + b];
+        }
         const std::uint32_t first = before + block_scan(size, &sum);
         before += sum;
         if (b >= kStride) continue;
-        next[part * kStride + b] += first;
+        next[part * kStride + b] += first + of_lower_parts;
         if (block_ == 0) begin[part].begin[b] = first;
       }
     }
     __syncthreads();
-    for (std::uint32_t i = chunk.begin + threadIdx.x; i < chunk.end; i += kThreads) {
+    for (std::uint32_t k = threadIdx.x; k < count; k += kThreads) {
+      const std::uint32_t i = item(k);
       const std::uint16_t bin = bins[i];
-      if (bin != soft_step::kNoBin) {
+      if (bin < device::kMostParts * kStride) {
         place(i, atomicAdd(&next[bin], 1u), static_cast<std::uint16_t>(bin % kStride));
       }
     }
@@ -486,14 +500,14 @@ class GridTeam {
         while (!has_passed(&barrier->passed, before)) {
         }
       }
-      ends = load_shared(&barrier->ended) != 0;
       __threadfence();
+      ends = load_shared(&barrier->ended) != 0;
     }
     if (__syncthreads_or(ends ? 1 : 0) != 0) asm volatile("exit;");
   }
 
-  /// Whether a barrier word of DeviceBarrier is beyond the barrier that follows `before`. Another
-  /// device may already have arrived at the next barrier.
+  /// Whether a word of DeviceBarrier has passed the barrier that follows `before`. It may already
+  /// be at the next barrier.
   __device__ static bool has_passed(const std::uint32_t* word, std::uint32_t before) {
     const std::uint32_t barriers = (load_shared(word) >> 16) - (before >> 16);
     return static_cast<std::int16_t>(barriers) > 0;
@@ -513,6 +527,7 @@ class GridTeam {
       for (std::uint32_t polls = 1; !has_passed(&barrier->signals[part], before); ++polls) {
         if (polls % kPollsPerLook != 0 || load_shared(all_->ended) == 0) continue;
         store_shared(&barrier->ended, 1u);
+        __threadfence();
         return;
       }
     }

@@ -62,7 +62,8 @@ class SharedArray {
   const PageLayout& layout() const noexcept { return layout_; }
   /// Moves pages, while no device uses them.
   void move(const std::vector<int>& devices, const std::vector<double>& first) {
-    memory_.move(devices, layout_.parts_of_pages(bytes_, MappedMemory::kPage, first), what_);
+    memory_.move(devices, layout_.parts_of_pages(bytes_, MappedMemory::kPage, first), what_,
+                 stream_);
   }
 
  private:
@@ -173,6 +174,7 @@ class CudaDevice {
     // Sized for every program, because captured graphs contain the address.
     const unsigned blocks = parts() * tuning::kMost * static_cast<unsigned>(multiprocessors_);
     scratch_.reserve(pool_, stream_.get(), GridTeam::scratch_words(blocks), "scratch memory");
+    if (parts() == 1) state_.reserve(pool_, stream_.get(), 1, "counters");
   }
   ~CudaDevice() {
     if (devices_.size() == 1) return;
@@ -183,6 +185,9 @@ class CudaDevice {
   int number() const noexcept { return device_; }
   Stream stream() const noexcept { return stream_.get(); }
   std::uint32_t parts() const noexcept { return static_cast<std::uint32_t>(devices_.size()); }
+  device::PartState* part_state(std::uint32_t part) const noexcept {
+    return parts() == 1 ? state_.data() : &memory_of(part)->state;
+  }
   /// Divides the arrays that are allocated later, and those that exist.
   void divide(std::uint32_t parts, const device::Divisions& divisions) {
     shares_memory_ = parts > 1;
@@ -297,9 +302,11 @@ class CudaDevice {
       for (std::uint32_t part = 0; part < parts; ++part) {
         TeamParts team = parts_;
         team.mine = part;
+        Program mine = program;
+        mine.data.part = part;
         try {
           const DeviceGuard other(devices_[part]);
-          launch(program, blocks, false, streams_[part], team);
+          launch(mine, blocks, false, streams_[part], team);
         } catch (...) {
           release_parts(part);
           throw;
@@ -421,7 +428,7 @@ class CudaDevice {
     std::vector<double> first(devices_.size());
     const device::Division* const division = divisions_.of(layout.index);
     for (std::size_t part = 0; part < first.size(); ++part) {
-      first[part] = division == nullptr
+      first[part] = division == nullptr || !division->is_known()
                         ? static_cast<double>(part) / static_cast<double>(first.size())
                         : division->begin[part] / static_cast<double>(layout.items);
     }
@@ -435,7 +442,7 @@ class CudaDevice {
                PageLayout layout) {
     const DeviceGuard guard(device_);
     const bool is_shared = shares_memory_ && layout.index != ArrayIndex::of_first &&
-                           capacity * sizeof(T) >= devices_.size() * MappedMemory::kPage;
+                           capacity * sizeof(T) > (devices_.size() - 1) * MappedMemory::kPage;
     if (layout.items == 0) layout.items = used;
     layout.items = layout.items * capacity / used;
     GrowableArray<T, WorldMemory> array;
@@ -445,6 +452,17 @@ class CudaDevice {
                                                        first_items(layout), what, stream_.get()));
     });
     buffer->array_.swap(array);
+  }
+
+  /// What the devices read and write most often, in a page of each part.
+  struct PartMemory {
+    DeviceBarrier barrier;
+    alignas(128) device::PartState state;
+  };
+  static_assert(sizeof(PartMemory) <= MappedMemory::kPage);
+  PartMemory* memory_of(std::uint32_t part) const noexcept {
+    return reinterpret_cast<PartMemory*>(static_cast<std::byte*>(part_memory_.data()) +
+                                         part * MappedMemory::kPage);
   }
 
   /// Creates what several devices need.
@@ -460,11 +478,11 @@ class CudaDevice {
     parts_.ended = ended_.data();
     std::vector<std::uint32_t> by_part(devices_.size());
     std::iota(by_part.begin(), by_part.end(), 0u);
-    barriers_ = MappedMemory(devices_, devices_.size() * MappedMemory::kPage, by_part, "barriers");
+    part_memory_ =
+        MappedMemory(devices_, devices_.size() * MappedMemory::kPage, by_part, "barriers");
     parts_.count = parts();
-    for (std::size_t part = 0; part < devices_.size(); ++part) {
-      parts_.barriers[part] = reinterpret_cast<DeviceBarrier*>(
-          static_cast<std::byte*>(barriers_.data()) + part * MappedMemory::kPage);
+    for (std::uint32_t part = 0; part < parts(); ++part) {
+      parts_.barriers[part] = &memory_of(part)->barrier;
     }
     reset_barriers();
   }
@@ -534,6 +552,7 @@ class CudaDevice {
   OrderingEvent order_;
   DeviceSearch search_;
   DeviceBuffer<std::uint32_t> scratch_;
+  DeviceBuffer<device::PartState> state_;  ///< of one device
   PinnedBuffer<std::byte> staging_;
   int multiprocessors_ = 0;  ///< of each device
   // Of several devices.
@@ -542,7 +561,7 @@ class CudaDevice {
   bool shares_memory_ = false;   ///< whether all devices share memory that is reserved now
   device::Divisions divisions_;
   SharedArray::List shared_arrays_;
-  MappedMemory barriers_;
+  MappedMemory part_memory_;
   PinnedBuffer<std::uint32_t> ended_;  ///< TeamParts::ended
   TeamParts parts_;
   std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,

@@ -28,7 +28,7 @@ struct CommitProgram {
     const BodyView& bodies = d.step.bodies;
     const Progress& progress = d.counters->progress;
     const std::uint64_t steps = progress.offset + progress.completed;  // before complete()
-    const soft_step::ContactView contacts = d.contacts();  // before complete() changes the parity
+    const soft_step::ContactView contacts = d.contacts();
     const soft_step::RowSetup setup = d.row_setup();
     team.count(
         contacts.sphere_count,
@@ -36,10 +36,11 @@ struct CommitProgram {
           store_impulses(setup, i);
           return soft_step::has_touched(contacts, i);
         },
-        &d.counters->touching_spheres, &d.divisions.contacts);
-    team.for_each_nowait(setup.size() - contacts.sphere_count, [&](std::uint32_t i) {
+        &d.counters->touching_spheres, &d.divisions.spheres);
+    const auto store_other = [&](std::uint32_t i) {
       store_impulses(setup, contacts.sphere_count + i);
-    });
+    };
+    team.for_each_nowait(setup.size() - contacts.sphere_count, store_other, &d.divisions.manifolds);
     ContinuousCollision{d.step, d.swept_bounds.sub_shapes, d.trees}.run(
         DividedTeam<Team>{team, d.divisions.sub_shapes}, bodies.count,
         [&](std::uint32_t i) { return bodies.ids[i].index; }, &d.counters->any_fast);
@@ -61,10 +62,11 @@ struct CommitProgram {
     team.count(
         bodies.count, [&](std::uint32_t i) { return bodies.is_active(bodies.ids[i].index); },
         &d.counters->awake, &d.divisions.bodies);
-    team.for_each_nowait(contacts.manifold_count, [&](std::uint32_t m) {
+    const auto add_begun = [&](std::uint32_t m) {
       const std::uint32_t begun = soft_step::count_begun(contacts, contacts.sphere_count + m);
       if (begun > 0) atomic_add(&d.counters->begun_points, begun);
-    });
+    };
+    team.for_each_nowait(contacts.manifold_count, add_begun, &d.divisions.manifolds);
     if (bodies.has_blocks &&
         partition::is_due(steps, bodies.movable_count, d.counters->blocks.without_place)) {
       team.sync();
@@ -74,7 +76,8 @@ struct CommitProgram {
   }
 
  private:
-  /// A team whose loops are divided by sub-shapes, or by bodies, whose numbers are close to those.
+  /// A team whose loops have the division of sub-shapes, also those over bodies: without compounds,
+  /// their numbers differ little.
   template <class Team>
   struct DividedTeam {
     const Team& team;
@@ -87,9 +90,9 @@ struct CommitProgram {
 
   /// Stores the impulses of the row of a contact or joint.
   JFPX_HD void store_impulses(const soft_step::RowSetup& setup, std::uint32_t i) const {
-    const soft_step::RowKind kind = setup.kind_of(i);
-    if (kind == soft_step::kNoRow) return;
-    soft_step::visit_row(kind, [&](auto type) {
+    const RowPlace place{data.row_places[i]};
+    if (!place.is_row()) return;
+    soft_step::visit_row(place.kind(), [&](auto type) {
       const auto& row = data.row<typename decltype(type)::type>(data.row_of[i]);
       setup.store(row, data.parts_of(row), i);
     });

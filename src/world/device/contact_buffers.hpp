@@ -28,7 +28,7 @@ class ContactBuffers {
     sizes_ = {from.sphere_count, from.manifold_count, from.point_count, 0};
     constexpr ArrayIndex kContact = ArrayIndex::contact;
     transfer.put(&spheres_, from.spheres, from.sphere_count, 0, kContact);
-    transfer.put(&manifolds_, from.manifolds, from.manifold_count, 0, ArrayIndex::equal);
+    transfer.put(&manifolds_, from.manifolds, from.manifold_count, 0, ArrayIndex::manifold);
     transfer.put(&points_, from.points, from.point_count, 0, ArrayIndex::equal);
     transfer.put(&impulses_, from.impulses, std::size_t{from.sphere_count} + from.point_count, 0,
                  kContact);
@@ -50,7 +50,7 @@ class ContactBuffers {
     const std::size_t kept = std::size_t{sizes_.spheres} + sizes_.manifolds;
     constexpr ArrayIndex kContact = ArrayIndex::contact;
     grow(transfer, &spheres_, capacity.spheres, sizes_.spheres, kContact);
-    grow(transfer, &manifolds_, capacity.candidates, sizes_.manifolds);
+    grow(transfer, &manifolds_, capacity.candidates, sizes_.manifolds, ArrayIndex::manifold);
     grow(transfer, &points_, capacity.points, sizes_.points);
     grow(transfer, &impulses_, std::size_t{capacity.spheres} + capacity.points,
          std::size_t{sizes_.spheres} + sizes_.points, kContact);

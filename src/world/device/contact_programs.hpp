@@ -30,8 +30,12 @@ struct BoundsProgram {
           blocks * kBodiesPerBlock, [&](std::uint32_t i) { d.body_at[i] = kNone; },
           &d.divisions.places);
     }
-    team.for_each(
-        bodies.capacity, [&](std::uint32_t i) { start(i); }, &d.divisions.slots);
+    Range* const spheres_of = d.contacts_of[d.counters->progress.completed & 1].spheres_of;
+    const auto start_body = [&](std::uint32_t i) {
+      start(i);
+      spheres_of[i] = {};
+    };
+    team.for_each(bodies.capacity, start_body, &d.divisions.slots);
     if (bodies.has_blocks && d.world_joints.count > 0) {
       team.for_each_nowait((bodies.capacity + kBodiesPerBlock - 1) / kBodiesPerBlock,
                            [&](std::uint32_t block) { d.first_inner_joint[block] = kNone; });
@@ -109,7 +113,7 @@ struct BoundsProgram {
     const StepData& d = data;
     const std::uint32_t place = d.step.bodies.place[body];
     if (place == soft_step::kNoPlace) {
-      d.unplaced[atomic_add(&d.counters->blocks.without_place, 1)] = body;
+      d.unplaced[append(&d.counters->blocks.without_place)] = body;
     } else {
       std::uint32_t index = place;
       if (d.parts > 1) {
@@ -135,7 +139,6 @@ struct BoundsProgram {
     d.first_order[body] = ~std::uint64_t{0};
     d.first_contact[body] = kNone;
     d.constrained[body] = 0;
-    d.now().spheres_of[body] = {};
   }
 };
 
@@ -181,20 +184,33 @@ struct SphereProgram {
           d.now().view.spheres[place] = {{a, b, 0, 0}, result.normal, result.distance};
         },
         &d.divisions.pairs);
+    team.team_of_part().once([&] { d.state().now.spheres = found; });
     team.once([&] {
       Counters& c = *d.counters;
       c.pairs = pairs;
       c.spheres = c.needed.spheres = found;
-      c.needed.candidates = c.candidates;
-      if (found > d.capacity.spheres || c.candidates > d.capacity.candidates) c.failed = 1;
+      std::uint32_t all = 0, most = 0;
+      for (std::uint32_t part = 0; part < d.parts; ++part) {
+        const std::uint32_t of_part = d.states[part]->candidates;
+        all += of_part;
+        if (of_part > most) most = of_part;
+      }
+      c.candidates = c.needed.candidates = all;
+      c.needed.candidates_of_part = most;
+      if (found > d.capacity.spheres || all > d.capacity.candidates ||
+          most > d.candidate_capacity()) {
+        c.failed = 1;
+      }
     });
   }
 
  private:
   JFPX_HD void add_candidate(std::uint32_t a, std::uint32_t b, std::uint32_t element = 0) const {
-    const std::uint32_t place = atomic_add(&data.counters->candidates, 1);
-    if (place >= data.capacity.candidates) return;
-    data.candidates[place] = ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b, element);
+    const std::uint32_t capacity = data.candidate_capacity();
+    const std::uint32_t place = append(&data.state().candidates);
+    if (place >= capacity) return;
+    data.candidates[data.part * capacity + place] =
+        ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b, element);
   }
 
   /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may touch.
@@ -243,14 +259,32 @@ struct ShapeProgram {
           &d.divisions.slots);
       return;
     }
-    team.for_each(d.counters->candidates, [&](std::uint32_t i) { test(i); });
+    const std::uint32_t begin = d.part * d.candidate_capacity();
+    team.team_of_part().for_each(d.state().candidates, [&](std::uint32_t i) { test(begin + i); });
     team.for_each(
         d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); }, &d.divisions.slots);
     const auto size = [&](std::uint32_t body) { return d.manifold_sizes[body]; };
-    const std::uint64_t sizes = team.scan(
-        d.step.bodies.capacity, size, size,
-        [&](std::uint32_t body, std::uint64_t first) { add_manifolds(body, first); },
-        &d.divisions.slots);
+    const Range slots = range_of_part(d.step.bodies.capacity, d.part, d.parts, &d.divisions.slots);
+    std::uint32_t* const bodies_with_manifolds = d.parent + slots.begin;  // not in use now
+    const auto place = [&](std::uint32_t body, std::uint64_t first) {
+      const std::uint64_t of_body = d.manifold_sizes[body];
+      const auto manifold = static_cast<std::uint32_t>(first >> 32);
+      d.now().manifolds_of[body] = {manifold, manifold + static_cast<std::uint32_t>(of_body >> 32)};
+      if (of_body == 0) return;
+      d.manifold_sizes[body] = first;
+      bodies_with_manifolds[append(&d.state().bodies_with_manifolds)] = body;
+    };
+    const std::uint64_t sizes =
+        team.scan(d.step.bodies.capacity, size, size, place, &d.divisions.slots);
+    // The bodies at a wall are close to each other, and so would be the work on them in the scan.
+    team.team_of_part().for_each_nowait(d.state().bodies_with_manifolds, [&](std::uint32_t i) {
+      const std::uint32_t body = bodies_with_manifolds[i];
+      add_manifolds(body, d.manifold_sizes[body]);
+    });
+    team.team_of_part().once([&] {
+      d.state().now.manifolds = static_cast<std::uint32_t>(sizes >> 32);
+      d.state().now.points = static_cast<std::uint32_t>(sizes);
+    });
     team.once([&] {
       Counters& c = *d.counters;
       c.manifolds = static_cast<std::uint32_t>(sizes >> 32);
@@ -285,7 +319,7 @@ struct ShapeProgram {
     const bool of_spheres = sub_shapes.is_sphere(pair.sub_shape_a) &&
                             !sub_shapes.is_wall(pair.sub_shape_b) &&
                             sub_shapes.is_sphere(pair.sub_shape_b);
-    const std::uint32_t first = atomic_add(&d.counters->touches, found.touch_count);
+    const std::uint32_t first = append(&d.counters->touches, found.touch_count);
     if (of_spheres) atomic_add(&d.counters->sphere_touches, found.touch_count);
     Touch* const touches = d.now().touches;
     for (std::uint32_t k = 0; k < found.touch_count; ++k) {
@@ -350,8 +384,6 @@ struct ShapeProgram {
     const StepData& d = data;
     auto manifold = static_cast<std::uint32_t>(sizes >> 32);
     auto point = static_cast<std::uint32_t>(sizes);
-    Range& range = d.now().manifolds_of[body];
-    range.begin = manifold;
     const std::uint32_t first =
         sort_list(d.first_candidate[body], d.next_candidate, [&](std::uint32_t x, std::uint32_t y) {
           const soft_step::ContactKey &p = d.tested[x].key, &q = d.tested[y].key;
@@ -370,7 +402,6 @@ struct ShapeProgram {
         d.now().view.points[point] = {p.arm_a, p.arm_b, p.distance, p.feature, p.tested_distance};
       }
     }
-    range.end = manifold;
   }
 };
 

@@ -34,6 +34,7 @@ inline constexpr int kMarks = 4;
 
 /// @tparam Device owns a stream of work, or emulates one on the host:
 ///   - `number()`, `stream()`: see cuda::DeviceStates; `parts()`: largest StepData::parts;
+///     `part_state(part)`: uninitialized, in the memory of the device of a part;
 ///   - `divide(parts, divisions)`: selects the devices of arrays that are reserved later, and moves
 ///     the pages of the others, with their addresses and contents; waits if there are several
 ///     parts;
@@ -46,7 +47,7 @@ inline constexpr int kMarks = 4;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: see cuda::DeviceSphereCollider, after
 ///     `reserve_pairs(n, capacity)`;
 ///   - `run(program, items, parts)`: runs program(team) with about one thread per item, on one
-///     device or on all;
+///     device or on all, each with its StepData::part;
 ///   - `wait()`: waits for all work; `wait_for_graphs()`: waits for all launched graphs;
 ///   - `fork(stream)`: later work of this object waits for earlier work of `stream`;
 ///     `join(stream)`: later work of `stream` waits for earlier work of this object;
@@ -59,6 +60,9 @@ class DeviceStep final : public DeviceWorld {
  public:
   DeviceStep(const Scene& scene, std::unique_ptr<Device> device)
       : device_(std::move(device)), transfer_(device_.get()), edit_transfer_(device_.get()) {
+    for (std::uint32_t part = 0; part < device_->parts(); ++part) {
+      data_.states[part] = device_->part_state(part);
+    }
     configure(scene);
   }
 
@@ -77,17 +81,12 @@ class DeviceStep final : public DeviceWorld {
     }
     const soft_step::ContactView kept = last->view();
     data_.parts = bodies.has_blocks() ? device_->parts() : 1;
-    const auto equal = [&](std::size_t n) {
-      return Division::equal(static_cast<std::uint32_t>(n), data_.parts);
-    };
-    data_.divisions.slots = equal(bodies.capacity());
-    data_.divisions.contacts = equal(kept.sphere_count);
-    data_.divisions.pairs = equal(kept.sphere_count);
-    data_.divisions.blocks = equal(bodies.capacity() / kBodiesPerBlock);
+    start_divisions(static_cast<std::uint32_t>(bodies.capacity()),
+                    {kept.sphere_count, kept.manifold_count, 0, 0});
     scale_divisions(static_cast<std::uint32_t>(bodies.capacity()),
                     static_cast<std::uint32_t>(bodies.size()), sub_shapes->view().ranges.bounded());
     device_->divide(data_.parts, data_.divisions);
-    divided_ = {};
+    has_numbers_ = false;
     bodies_.upload(transfer_, bodies, room_, &data_);
     scratch_.reserve_bodies(transfer_, room_, &data_);
     hulls_.clear();
@@ -435,14 +434,30 @@ class DeviceStep final : public DeviceWorld {
   /// Divides the step among the devices, so that each has about as many contacts and bodies.
   void divide() {
     const BodyView& bodies = data_.step.bodies;
-    const bool has_numbers = has_stepped_ && data_.parts > 1;  // of the blocks in the last step
+    const std::uint32_t before = data_.parts;
     data_.parts = bodies.has_blocks ? device_->parts() : 1;
     if (data_.parts > 1) {
-      if (has_numbers && !is_divided()) divide_contacts();
+      if (before == 1) start_divisions(bodies.capacity, {});
+      if (has_numbers_ && !is_divided()) divide_contacts();
       scale_divisions(bodies.capacity, bodies.count,
                       data_.swept_bounds.sub_shapes.ranges.bounded());
     }
     device_->divide(data_.parts, data_.divisions);
+  }
+
+  /// The division before a step by several parts. @param contacts of the last step, if known
+  void start_divisions(std::uint32_t slots, const ContactSizes& contacts) {
+    const auto equal = [&](std::uint32_t n) {
+      return n > 0 ? Division::equal(n, data_.parts) : Division::unknown();
+    };
+    Divisions& to = data_.divisions;
+    to.slots = Division::equal(slots, data_.parts);
+    to.blocks = Division::equal(slots / kBodiesPerBlock, data_.parts);
+    to.pairs = Division::unknown();
+    to.spheres = equal(contacts.spheres);
+    to.manifolds = equal(contacts.manifolds);
+    to.contacts = equal(contacts.spheres + contacts.manifolds);
+    divided_ = {};
   }
 
   /// Whether the division fits the step: pages are moved when it changes.
@@ -450,7 +465,7 @@ class DeviceStep final : public DeviceWorld {
     constexpr std::uint64_t kMostSteps = 256;
     const auto is_close = [](std::uint64_t a, std::uint64_t b) {
       const std::uint64_t difference = a > b ? a - b : b - a;
-      return difference <= std::max(b / 32, std::uint64_t{1024});
+      return difference <= std::max(b / 8, std::uint64_t{1024});
     };
     return data_.parts == 1 ||
            (divided_.has_contacts && known_.completed < divided_.completed + kMostSteps &&
@@ -462,36 +477,52 @@ class DeviceStep final : public DeviceWorld {
     return std::uint64_t{sizes.spheres} + sizes.manifolds;
   }
 
+  static constexpr std::uint64_t kContactLoad = 2, kBodyLoad = 5;  ///< measured: several_gpus.md
+  static std::uint64_t load_of(std::uint64_t contacts, std::uint64_t bodies) {
+    return kContactLoad * contacts + kBodyLoad * bodies;
+  }
+
   /// Divides the slots by the contacts of the last step, and what belongs to the bodies by slots.
   void divide_contacts() {
     const ContactSizes& sizes = last_contacts().sizes();
     const BodyView& bodies = data_.step.bodies;
     const soft_step::ContactView contacts = last_contacts().view().view;
-    // Slot of body a of a contact. The longer list decides, because both are sorted by slot.
+    const SubShapeView& sub_shapes = data_.swept_bounds.sub_shapes;
+    const auto spheres = read_list(contacts.spheres, sizes.spheres);
+    const auto manifolds = read_list(contacts.manifolds, sizes.manifolds);
+    const auto pairs = read_list(data_.pairs, pairs_);
+    const auto sub_shape_bodies = read_list(sub_shapes.bodies, sub_shapes.ranges.bounded());
+    const auto slot_of_sphere = [&](std::uint32_t i) { return spheres[i].key.a; };
+    const auto slot_of_manifold = [&](std::uint32_t i) { return manifolds[i].key.a; };
+    // The longer list decides. Both are sorted by slot.
     const bool by_spheres = sizes.spheres >= sizes.manifolds;
     const std::uint32_t count = by_spheres ? sizes.spheres : sizes.manifolds;
     const auto slot_of = [&](std::uint32_t i) {
-      return fetch(by_spheres ? &contacts.spheres[i].key.a : &contacts.manifolds[i].key.a);
+      return by_spheres ? slot_of_sphere(i) : slot_of_manifold(i);
     };
-    const std::uint32_t* const sub_shape_body = data_.swept_bounds.sub_shapes.bodies;
-    const std::uint32_t sub_shapes = data_.swept_bounds.sub_shapes.ranges.bounded();
-    std::vector<std::uint32_t> first_bodies(bodies.capacity / kBodiesPerBlock + 1);
+    std::vector<std::uint32_t> first_bodies(blocks_.placed());
     device_->download(first_bodies.data(), data_.first_of_block, first_bodies.size());
     device_->wait();
-    Divisions& to = data_.divisions;
+    Divisions to = data_.divisions;
     for (std::uint32_t part = 1; part < data_.parts; ++part) {
-      const std::uint64_t target =
-          (std::uint64_t{count} + bodies.capacity) * part / data_.parts;  // contacts and bodies
+      const std::uint64_t target = load_of(count, bodies.capacity) * part / data_.parts;
       const std::uint32_t contact =
-          first_of(count, [&](std::uint32_t i) { return std::uint64_t{i} + slot_of(i) >= target; });
-      std::uint32_t slot = static_cast<std::uint32_t>(target - contact);
+          first_of(count, [&](std::uint32_t i) { return load_of(i, slot_of(i)) >= target; });
+      const std::uint64_t of_contacts = std::min(target, kContactLoad * contact);
+      auto slot = static_cast<std::uint32_t>((target - of_contacts) / kBodyLoad);
       if (contact > 0) slot = std::max(slot, slot_of(contact - 1) + 1);
       slot = std::min(slot, contact < count ? slot_of(contact) : bodies.capacity);
+      slot = std::max(slot, to.slots.begin[part - 1]);
       to.slots.begin[part] = slot;
-      to.contacts.begin[part] = by_spheres ? contact : sizes.spheres + contact;
+      to.spheres.begin[part] =
+          first_of(sizes.spheres, [&](std::uint32_t i) { return slot_of_sphere(i) >= slot; });
+      to.manifolds.begin[part] =
+          first_of(sizes.manifolds, [&](std::uint32_t i) { return slot_of_manifold(i) >= slot; });
+      to.contacts.begin[part] =
+          by_spheres ? to.spheres.begin[part] : sizes.spheres + to.manifolds.begin[part];
       to.pairs.begin[part] = first_of(pairs_, [&](std::uint32_t i) {
-        const std::uint32_t a = fetch(&data_.pairs[i].a);
-        return a >= sub_shapes || fetch(&sub_shape_body[a]) >= slot;
+        const std::uint32_t a = pairs[i].a;
+        return a >= sub_shape_bodies.size() || sub_shape_bodies[a] >= slot;
       });
       // Bodies without a place are in blocks in any order.
       to.blocks.begin[part] =
@@ -500,8 +531,8 @@ class DeviceStep final : public DeviceWorld {
                     first_bodies, [&](std::uint32_t body) { return body < slot; }))
               : static_cast<std::uint32_t>(std::uint64_t{blocks_.all()} * slot / bodies.capacity);
     }
+    data_.divisions = to;
     divided_ = {true, known_.completed, contact_count(), pairs_, blocks_.places};
-    ++changes_;
   }
   /// Lowest i < n for which a condition holds that does not hold for lower ones and holds for all
   /// higher ones; n if there is none.
@@ -524,6 +555,33 @@ class DeviceStep final : public DeviceWorld {
     device_->download(&value, from, 1);
     device_->wait();
     return value;
+  }
+  /// Reads items of a list on the device. A short list is copied at once.
+  template <class T>
+  class ListReader {
+   public:
+    ListReader(const DeviceStep& step, const T* list, std::uint32_t size)
+        : step_(step), list_(list), size_(size) {
+      constexpr std::uint32_t kMostCopied = 4096;
+      if (size == 0 || size > kMostCopied) return;
+      items_.resize(size);
+      step.device_->download(items_.data(), list, size);
+      step.device_->wait();
+    }
+    std::uint32_t size() const { return size_; }
+    T operator[](std::uint32_t i) const {
+      return items_.empty() ? step_.fetch(list_ + i) : items_[i];
+    }
+
+   private:
+    const DeviceStep& step_;
+    const T* list_;
+    std::uint32_t size_;
+    std::vector<T> items_;
+  };
+  template <class T>
+  ListReader<T> read_list(const T* list, std::uint32_t size) const {
+    return ListReader<T>(*this, list, size);
   }
 
   /// Sets the divisions that follow from those of slots and of blocks.
@@ -609,8 +667,9 @@ class DeviceStep final : public DeviceWorld {
       if (known_.completed + 2 < progress.completed) continue;
       contacts_[now()].complete(progress.contacts[now()], data_.step.bodies.capacity);
       has_stepped_ = true;
+      has_numbers_ = data_.parts > 1;
     }
-    if (has_stepped_ && !is_divided()) is_ready_ = false;
+    if (has_numbers_ && !is_divided()) is_ready_ = false;
   }
 
   static Result result_of(const Counters& counters) {
@@ -668,6 +727,7 @@ class DeviceStep final : public DeviceWorld {
   std::uint64_t graph_version_ = 0;  ///< version() of the last captured graph; 0: none
   std::uint32_t pairs_ = 0;          ///< of swept bounds, in the last step
   BlockCounts blocks_;               ///< in the last step
+  bool has_numbers_ = false;  ///< whether the last step had several parts, which number the blocks
   /// The step by which the divisions were made.
   struct {
     bool has_contacts = false;  ///< whether there was one

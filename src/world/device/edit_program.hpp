@@ -4,6 +4,7 @@
 #include "src/contact_solver/soft_step/colors.hpp"
 #include "src/world/contacts/begun_contacts.hpp"
 #include "src/world/device/slot_values.hpp"
+#include "src/world/device/start_step.hpp"
 #include "src/world/device/step_data.hpp"
 
 namespace jfpx {
@@ -44,6 +45,8 @@ struct EditProgram {
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
+    start_state(team, data);
+    team.sync();
     if (visits_contacts) visit_contacts(team);
     team.for_each(count, [&](std::uint32_t k) { edit(edits[k]); });
     team.for_each(mass_count, [&](std::uint32_t k) { edit_mass(masses[k]); });

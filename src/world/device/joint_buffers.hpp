@@ -22,6 +22,7 @@ class JointBuffers {
   void upload(const Transfer<Device>& transfer, const soft_step::JointView& from,
               std::uint64_t last, std::size_t room, std::size_t parts, StepData* data) {
     DeviceJoints& to = data->world_joints;
+    const PageLayout by_part{.index = ArrayIndex::equal};
     to.count = from.count;
     to.inputs = transfer.put(&inputs_, from.inputs, from.count);
     transfer.put(&kept_[last], from.last, from.count);
@@ -36,8 +37,8 @@ class JointBuffers {
         const soft_step::RowKind kind = soft_step::kind_of_joint(from.inputs[joint].type);
         ++to.of_kind[kind - soft_step::kContactRowKinds];
       }
-      data->distance_rows = transfer.room_to_grow(&distance_rows_, parts * to.of_kind[0]);
-      data->frame_rows = transfer.room_to_grow(&frame_rows_, parts * to.of_kind[1]);
+      data->distance_rows = transfer.room_to_grow(&distance_rows_, parts * to.of_kind[0], by_part);
+      data->frame_rows = transfer.room_to_grow(&frame_rows_, parts * to.of_kind[1], by_part);
     }
     transfer.wait();
   }

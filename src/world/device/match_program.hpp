@@ -22,7 +22,8 @@ struct MatchProgram {
   JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
     const StepData& d = data;
-    const std::uint32_t spheres = d.counters->spheres;
+    const ContactSizes sizes = d.state().now;
+    const std::uint32_t spheres = sizes.spheres;
     const auto match = [&](std::uint32_t i) {
       const std::uint8_t before = i < spheres ? match_sphere(i) : match_manifold(i - spheres);
       const soft_step::ContactView now = d.contacts();
@@ -36,10 +37,12 @@ struct MatchProgram {
         keep(key, before);
       } else {
         now.colors[i] = soft_step::kNoColor;
-        d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = i;
+        d.uncolored[append(&d.counters->uncolored[0])] = i;
       }
     };
-    team.for_each(spheres + d.counters->manifolds, match, &d.divisions.contacts);
+    team.for_each_nowait(spheres, match, &d.divisions.spheres);
+    team.for_each(
+        sizes.manifolds, [&](std::uint32_t m) { match(spheres + m); }, &d.divisions.manifolds);
     if (d.world_joints.count > 0) {
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) { match_joint(joint); });
       team.for_each(d.world_joints.count, [&](std::uint32_t joint) {
@@ -128,7 +131,7 @@ struct MatchProgram {
       } else if (soft_step::keeps_color(now.color, is_inner(key))) {
         keep(key, now.color);
       } else {
-        d.uncolored[atomic_add(&d.counters->uncolored[0], 1)] = d.contacts().size() + joint;
+        d.uncolored[append(&d.counters->uncolored[0])] = d.contacts().size() + joint;
       }
     }
     joints.now[joint] = now;
@@ -163,7 +166,7 @@ struct MatchProgram {
         const std::uint32_t i = list[k];
         const soft_step::ContactKey key = setup.key(i);
         if (d.first_contact[key.a] != i || d.first_contact[key.b] != i) {
-          next_list[atomic_add(next_count, 1)] = i;
+          next_list[append(next_count)] = i;
           return;
         }
         setup.set_color(i, soft_step::take_lowest_color(is_inner(key), &d.used_colors[key.a],

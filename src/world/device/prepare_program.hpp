@@ -106,17 +106,18 @@ struct PrepareProgram {
     const StepData& d = data;
     const soft_step::RowSetup setup = d.row_setup();
     team.partition(
-        setup.size(), d.row_bins, d.bin_sizes, d.bins, d.row_capacity,
+        {setup.contacts.sphere_count, setup.size() - setup.contacts.sphere_count,
+         &d.divisions.spheres, &d.divisions.manifolds},
+        d.row_places, d.states, d.bins, d.row_capacity,
         [&](std::uint32_t i) -> std::uint16_t {
           const std::uint32_t color = setup.color_of(i);
+          const soft_step::RowKind kind = setup.kind_of(i);
+          if (kind == soft_step::kNoRow) return RowPlace::kNone;
           if (d.step.bodies.has_blocks && soft_step::is_inner_color(color)) {
             if (setup.is_joint(i)) add_inner_joint(setup, i);
-            return soft_step::kNoBin;
+            return RowPlace::inner(kind, color);
           }
-          const soft_step::RowKind kind = setup.kind_of(i);
-          return kind == soft_step::kNoRow
-                     ? soft_step::kNoBin
-                     : soft_step::bin_of(kind, soft_step::RowSetup::group_of(color));
+          return soft_step::bin_of(kind, soft_step::RowSetup::group_of(color));
         },
         [&](std::uint32_t i, std::uint16_t bin) -> std::uint32_t {
           const std::uint32_t group = bin % soft_step::kGroups;
@@ -129,17 +130,17 @@ struct PrepareProgram {
         [&](std::uint32_t i, std::uint32_t row, std::uint16_t bin) {
           if (!has_memory(row)) return;
           d.row_contact[row] = i;
-          const soft_step::ContactKey key = setup.key(i);
           const std::uint32_t group = bin % soft_step::kGroups;
           if (group == soft_step::kFixedGroup) {
-            prepend(&d.first_fixed[d.index_of(setup.movable_body(key))], d.next_fixed, row);
-          } else if (group > 0) {
+            const std::uint32_t body = setup.movable_body(setup.key(i));
+            prepend(&d.first_fixed[d.index_of(body)], d.next_fixed, row);
+          } else if (group > 0 && !d.step.bodies.has_blocks) {  // for Tickets
+            const soft_step::ContactKey key = setup.key(i);
             const std::uint64_t bit = std::uint64_t{1} << (group - 1);
             atomic_or(&d.row_bodies[d.index_of(key.a)].colors, bit);
             atomic_or(&d.row_bodies[d.index_of(key.b)].colors, bit);
           }
-        },
-        &d.divisions.contacts);
+        });
     team.for_each_nowait(d.parts * kBins, [&](std::uint32_t i) { note_bin(i / kBins, i % kBins); });
   }
 
@@ -183,12 +184,11 @@ struct PrepareProgram {
           if (r >= capacity) return;
           d.manifold_rows[part * capacity + r].first = part * d.capacity.row_points + first;
         });
-    team.team_of_part().once([&] { d.counters->parts[part].points_of_rows = points; });
+    team.team_of_part().once([&] { d.state().points_of_rows = points; });
   }
 
   JFPX_HD void add_inner_joint(const soft_step::RowSetup& setup, std::uint32_t i) const {
     const StepData& d = data;
-    if (setup.kind_of(i) == soft_step::kNoRow) return;
     const std::uint32_t block = d.index_of(setup.key(i).a) / kBodiesPerBlock;
     prepend(&d.first_inner_joint[block], d.next_inner_joint, setup.joint_of(i));
   }
@@ -220,7 +220,9 @@ struct PrepareProgram {
                            }
                          });
       threads.sync();
-      threads.once([&] { allocate_inner_rows(team.part(), block, rows); });
+      threads.for_each(soft_step::kRowKinds, [&](std::uint32_t kind) {
+        allocate_inner_rows(block, static_cast<soft_step::RowKind>(kind), rows);
+      });
       threads.sync();
       for_inner_contacts(threads, setup, block,
                          [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
@@ -237,33 +239,32 @@ struct PrepareProgram {
   static constexpr soft_step::RowKind kSphere = soft_step::kKindOf<soft_step::SphereRow>;
   static constexpr soft_step::RowKind kManifold = soft_step::kKindOf<soft_step::ManifoldRow>;
 
-  JFPX_HD void allocate_inner_rows(std::uint32_t part, std::uint32_t block, BlockRows* rows) const {
+  JFPX_HD void allocate_inner_rows(std::uint32_t block, soft_step::RowKind kind,
+                                   BlockRows* rows) const {
     const StepData& d = data;
-    PartCounters& counters = d.counters->parts[part];
-    const std::uint32_t points_end =
-        rows->points + atomic_add(&counters.inner_points, rows->points);
-    for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
-      std::uint32_t* const next = rows->next[kind];
-      std::uint32_t count = 0;
-      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
-        count += next[color];
-      }
-      const std::uint32_t end =
-          count + (count > 0 ? atomic_add(&counters.inner_rows[kind], count) : 0);
-      const std::uint32_t capacity = d.capacity_of(kind);
-      rows->has_room[kind] =
-          end <= capacity && (kind != kManifold || points_end <= d.capacity.row_points);
-      std::uint32_t begin = (part + 1) * capacity - end;
-      std::uint32_t* const begins = d.inner_begin(block, kind);
-      for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
-        begins[color] = begin;
-        const std::uint32_t size = next[color];
-        next[color] = begin;
-        begin += size;
-      }
-      begins[soft_step::kColorsPerClass] = begin;
+    PartState& state = d.state();
+    std::uint32_t* const next = rows->next[kind];
+    std::uint32_t count = 0;
+    for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+      count += next[color];
     }
-    rows->points = (part + 1) * d.capacity.row_points - points_end;
+    const std::uint32_t end = count + (count > 0 ? atomic_add(&state.inner_rows[kind], count) : 0);
+    const std::uint32_t capacity = d.capacity_of(kind);
+    rows->has_room[kind] = end <= capacity;
+    if (kind == kManifold && count > 0) {
+      const std::uint32_t points_end = rows->points + atomic_add(&state.inner_points, rows->points);
+      if (points_end > d.capacity.row_points) rows->has_room[kind] = false;
+      rows->points = (d.part + 1) * d.capacity.row_points - points_end;
+    }
+    std::uint32_t begin = (d.part + 1) * capacity - end;
+    std::uint32_t* const begins = d.inner_begin(block, kind);
+    for (std::uint32_t color = 0; color < soft_step::kColorsPerClass; ++color) {
+      begins[color] = begin;
+      const std::uint32_t size = next[color];
+      next[color] = begin;
+      begin += size;
+    }
+    begins[soft_step::kColorsPerClass] = begin;
   }
 
   /// Calls f(contact, kind, color) for the contacts and joints with inner rows in a block.
@@ -273,10 +274,8 @@ struct PrepareProgram {
     const StepData& d = data;
     const Range places = d.counters->blocks.indices_of(block);
     const auto visit = [&](std::uint32_t i) {
-      const std::uint32_t color = setup.color_of(i);
-      if (!soft_step::is_inner_color(color)) return;
-      const soft_step::RowKind kind = setup.kind_of(i);
-      if (kind != soft_step::kNoRow) f(i, kind, color);
+      const RowPlace place{d.row_places[i]};
+      if (place.is_inner()) f(i, place.kind(), place.color());
     };
     threads.for_each(places.end - places.begin, [&](std::uint32_t k) {
       const std::uint32_t body = d.body_at[places.begin + k];
@@ -367,13 +366,13 @@ struct PrepareProgram {
     const StepData& d = data;
     std::uint32_t all = 0, manifolds = 0, points = 0, rows = 0;
     for (std::uint32_t part = 0; part < d.parts; ++part) {
-      const PartCounters& counters = d.counters->parts[part];
+      const PartState& state = *d.states[part];
       const std::uint32_t* begin = d.bins[part].begin;
-      const std::uint32_t of_part = manifolds_of(part) + counters.inner_rows[kManifold];
+      const std::uint32_t of_part = manifolds_of(part) + state.inner_rows[kManifold];
       all += of_part;
       manifolds = larger(manifolds, of_part);
-      points = larger(points, counters.points_of_rows + counters.inner_points);
-      rows = larger(rows, begin[kBins] - begin[0] + counters.inner_rows[kSphere]);
+      points = larger(points, state.points_of_rows + state.inner_points);
+      rows = larger(rows, begin[kBins] - begin[0] + state.inner_rows[kSphere]);
     }
     team.once([&] { d.counters->manifold_rows = all; });
     team.team_of_part().once([&] {

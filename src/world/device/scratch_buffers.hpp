@@ -77,14 +77,14 @@ class ScratchBuffers {
     d.pairs = transfer.room(&pairs_, c.pairs, by_pair);
     d.pair_found = transfer.room(&pair_found_, c.pairs, by_pair);
     d.pair_results = transfer.room(&pair_results_, c.pairs, by_pair);
-    d.candidates = transfer.room(&candidates_, c.candidates, kEqual);
-    d.tested = transfer.room(&tested_, c.candidates, kEqual);
-    d.next_candidate = transfer.room(&next_candidate_, c.candidates, kEqual);
+    const std::size_t candidates = d.parts * std::size_t{d.candidate_capacity()};
+    d.candidates = transfer.room(&candidates_, candidates, kEqual);
+    d.tested = transfer.room(&tested_, candidates, kEqual);
+    d.next_candidate = transfer.room(&next_candidate_, candidates, kEqual);
     d.uncolored = transfer.room(&uncolored_, all_rows, by_contact);
     d.still_uncolored = transfer.room(&still_uncolored_, all_rows, kEqual);
     d.row_of = d.uncolored;
-    d.row_bins = transfer.room(&row_bins_, all_rows, by_contact);
-    d.bin_sizes = transfer.room(&bin_sizes_, kMostParts * (kBins + 1), kEqual);
+    d.row_places = transfer.room(&row_places_, all_rows, by_contact);
     d.bins = transfer.room(&bins_, kMostParts, kEqual);
     d.row_contact = transfer.room(&row_contact_, rows, kEqual);
     d.next_fixed = transfer.room(&next_fixed_, rows, kEqual);
@@ -150,9 +150,9 @@ class ScratchBuffers {
     d.solver_index = transfer.room(&solver_index_, n);
     d.unplaced = transfer.room(&unplaced_, n);
     const std::size_t blocks = n / kBodiesPerBlock + 1;
-    constexpr std::size_t kColorEnds = soft_step::kColorsPerClass + 1u;
     const PageLayout layout{.index = ArrayIndex::block, .items = blocks};
-    d.inner_rows = transfer.room(&inner_rows_, blocks * soft_step::kRowKinds * kColorEnds, layout);
+    d.inner_rows = transfer.room(
+        &inner_rows_, blocks * soft_step::kRowKinds * (soft_step::kColorsPerClass + 1u), layout);
     d.first_inner_joint = transfer.room(&first_inner_joint_, blocks, layout);
     d.first_of_block = transfer.room(&first_of_block_, blocks, kEqual);
     d.block_number = transfer.room(&block_number_, blocks, kEqual);
@@ -184,12 +184,12 @@ class ScratchBuffers {
   Buffer<std::uint32_t> first_candidate_, next_candidate_, first_contact_, uncolored_,
       still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_, body_at_,
       solver_index_, unplaced_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_,
-      first_of_block_, block_number_, bin_sizes_;
+      first_of_block_, block_number_;
   Buffer<RowBins> bins_;
   Buffer<soft_step::UsedColors> used_colors_;
   Buffer<std::uint64_t> manifold_sizes_, first_order_;
   Buffer<std::uint8_t> pair_found_, marked_, constrained_, traits_;
-  Buffer<std::uint16_t> row_bins_;
+  Buffer<std::uint16_t> row_places_;
   Buffer<soft_step::SolverBody> solver_;
   Buffer<Quat> orientation_, orientation_by_index_;
   Buffer<soft_step::SphereRow> sphere_rows_;

@@ -7,6 +7,18 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
+/// Sets the parity and the sizes in the state of each part, without a barrier.
+template <class Team>
+JFPX_HD void start_state(const Team& team, const StepData& data) {
+  team.team_of_part().once([&] {
+    const Progress& progress = data.counters->progress;
+    PartState& state = data.state();
+    state.parity = static_cast<std::uint32_t>(progress.completed & 1);
+    state.now = {};
+    state.last = progress.contacts[1 - state.parity];
+  });
+}
+
 /// Resets the counters of the last step, without a barrier.
 template <class Team>
 JFPX_HD void start_counters(const Team& team, const StepData& data) {
@@ -14,7 +26,16 @@ JFPX_HD void start_counters(const Team& team, const StepData& data) {
     static_cast<StepCounters&>(*data.counters) = {};
     data.counters->progress.started = 1;
   });
-  team.for_each_nowait(data.parts * (kBins + 1), [&](std::uint32_t i) { data.bin_sizes[i] = 0; });
+  start_state(team, data);
+  const auto of_part = team.team_of_part();
+  PartState& state = data.state();
+  of_part.once([&] {
+    state.candidates = state.bodies_with_manifolds = 0;
+    for (std::uint32_t& count : state.inner_rows) count = 0;
+    state.inner_points = state.points_of_rows = 0;
+  });
+  of_part.for_each_nowait(data.parts * (kBins + 1),
+                          [&](std::uint32_t i) { state.bin_sizes[i] = 0; });
 }
 
 /// Saves the columns of a body that the step changes before it can fail.

@@ -31,7 +31,7 @@ using soft_step::kBodiesPerBlock;
 inline constexpr std::uint32_t kMostParts = 8;
 
 /// Range of a list.
-struct Range {
+struct alignas(8) Range {
   std::uint32_t begin = 0, end = 0;
 };
 
@@ -39,6 +39,14 @@ struct Range {
 struct Division {
   /// By part: its first item, ascending from 0.
   std::uint32_t begin[kMostParts] = {};
+
+  /// The division of a list whose size is not known: each part has about as many items.
+  static Division unknown() {
+    Division division;
+    division.begin[1] = kNone;
+    return division;
+  }
+  JFPX_HD bool is_known() const { return begin[1] != kNone; }
 
   /// Gives each part as many of n items.
   static Division equal(std::uint32_t n, std::uint32_t parts) {
@@ -61,7 +69,9 @@ struct Division {
 /// The divisions of a step by several parts. A part has the bodies of consecutive slots, and what
 /// belongs to them, so that most memory that it uses is its own.
 struct Divisions {
-  Division slots, bodies, sub_shapes, places, blocks, contacts, pairs;
+  Division slots, bodies, sub_shapes, places, blocks, pairs;
+  Division spheres, manifolds;  ///< contacts of two spheres, and others
+  Division contacts;            ///< numbers of contacts
 
   /// @returns null for an array that is not divided so
   const Division* of(ArrayIndex index) const {
@@ -78,6 +88,8 @@ struct Divisions {
         return &blocks;
       case ArrayIndex::contact:
         return &contacts;
+      case ArrayIndex::manifold:
+        return &manifolds;
       case ArrayIndex::pair:
         return &pairs;
       case ArrayIndex::equal:
@@ -94,12 +106,20 @@ JFPX_HD inline Range range_of_part(std::uint32_t n, std::uint32_t part, std::uin
   if (parts == 1) return {0, n};
   const auto first = [&](std::uint32_t p) {
     if (p == parts) return n;
-    if (division == nullptr) return static_cast<std::uint32_t>(std::uint64_t{n} * p / parts);
+    if (division == nullptr || !division->is_known()) {
+      return static_cast<std::uint32_t>(std::uint64_t{n} * p / parts);
+    }
     return division->begin[p] < n ? division->begin[p] : n;
   };
   return {first(part), first(part + 1)};
 }
-/// The part that has an item.
+/// Items of two lists, numbered from the first one on, and how the parts share each.
+struct TwoLists {
+  std::uint32_t first = 0, second = 0;  ///< number of items
+  const Division *division_of_first = nullptr, *division_of_second = nullptr;
+};
+
+/// The part that has an item. @param division a known one
 JFPX_HD inline std::uint32_t part_of(std::uint32_t item, std::uint32_t parts,
                                      const Division& division) {
   std::uint32_t part = 0;
@@ -128,6 +148,30 @@ struct BlockCounts {
   }
 };
 
+/// Where the row of a contact or joint is.
+struct RowPlace {
+  /// kNone: there is no row. An inner row: kInner, kind and color. Any other row: the number of its
+  /// part times kBins + 1, and its bin.
+  std::uint16_t code;
+
+  static constexpr std::uint16_t kNone = 0xffff, kInner = 0x8000;
+  static_assert(kMostParts * (kBins + 1) < kInner);
+  static_assert(soft_step::kRowKinds * soft_step::kColorsPerClass < kNone - kInner);
+
+  JFPX_HD static std::uint16_t inner(soft_step::RowKind kind, std::uint32_t color) {
+    return static_cast<std::uint16_t>(kInner + kind * soft_step::kColorsPerClass + color);
+  }
+  JFPX_HD bool is_row() const { return code != kNone; }
+  JFPX_HD bool is_inner() const { return is_row() && code >= kInner; }
+  JFPX_HD soft_step::RowKind kind() const {
+    return static_cast<soft_step::RowKind>(is_inner() ? (code - kInner) / soft_step::kColorsPerClass
+                                                      : code % (kBins + 1) / soft_step::kGroups);
+  }
+  JFPX_HD std::uint32_t color() const {  ///< of an inner row
+    return (code - kInner) % soft_step::kColorsPerClass;
+  }
+};
+
 /// The rows of a part, sorted by bin, except inner rows.
 struct RowBins {
   std::uint32_t begin[kBins + 1];             ///< first row of a bin, and the end
@@ -136,26 +180,21 @@ struct RowBins {
   BlockCounts blocks;                         ///< Counters::blocks
 };
 
-/// Sizes of lists of a part.
-struct PartCounters {
-  std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
-  std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
-  std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
-};
-
 /// Capacities of lists whose size is known only on the device. A step that exceeds a capacity does
 /// not change the state of the world; the host reserves Counters::needed and repeats the step.
 struct Capacity {
   std::uint64_t pairs = 0;       ///< of swept bounds
   std::uint32_t spheres = 0;     ///< contacts of two spheres
   std::uint32_t candidates = 0;  ///< pairs of other sub-shapes, also the capacity of manifolds
-  std::uint32_t points = 0;      ///< of manifolds
-  std::uint32_t touches = 0;     ///< points of World::contacts(), except contacts of two spheres
+  std::uint32_t candidates_of_part = 0;  ///< of a part, if there are several parts
+  std::uint32_t points = 0;              ///< of manifolds
+  std::uint32_t touches = 0;  ///< points of World::contacts(), except contacts of two spheres
   /// Of a part: rows of manifolds, including contacts of spheres without SphereRow.
   std::uint32_t manifold_rows = 0;
   std::uint32_t row_points = 0;  ///< of a part: points of these rows
   std::uint32_t rows = 0;        ///< of a part: rows of any kind, if there are several parts
   std::uint32_t indices = 0;     ///< solver indices of a world with blocks
+  std::uint32_t unused = 0;      ///< instead of padding
 
   /// Gives each list room for `needed`, if it is not 0, and slack, so that few steps are repeated
   /// while a heap falls: a quarter of the need, but as much as the need for lists of less than half
@@ -173,6 +212,7 @@ struct Capacity {
     grow_one(&pairs, needed.pairs);
     grow_one(&spheres, needed.spheres);
     grow_one(&candidates, needed.candidates);
+    grow_one(&candidates_of_part, needed.candidates_of_part);
     grow_one(&points, needed.points);
     grow_one(&touches, needed.touches);
     grow_one(&manifold_rows, needed.manifold_rows);
@@ -213,7 +253,6 @@ struct StepCounters {
   BlockCounts blocks;
   std::uint32_t manifold_rows = 0;       ///< number of rows of manifolds
   std::uint32_t crossing_colors = 0;     ///< end of the colors of crossing rows
-  PartCounters parts[kMostParts];        ///< of the rows
   std::uint32_t any_fast = 0;            ///< 1: ContinuousCollision::is_fast() of a sub-shape
   std::uint64_t largest_coordinate = 0;  ///< partition::magnitude_of()
 
@@ -234,8 +273,21 @@ struct Counters : StepCounters {
 };
 static_assert(std::has_unique_object_representations_v<Counters>);
 
+/// What the threads of a part read or count often, in the memory of its device.
+struct PartState {
+  std::uint32_t parity = 0;      ///< of Progress::completed at the start of the step
+  ContactSizes now, last;        ///< of the contact set, as far as it is known, and of the last one
+  std::uint32_t candidates = 0;  ///< size of the list of the part
+  std::uint32_t bodies_with_manifolds = 0;              ///< bodies a of the part
+  std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
+  std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
+  std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
+  /// By part and bin: number of rows of that part whose contacts are in the share of this part.
+  std::uint32_t bin_sizes[kMostParts * (kBins + 1)] = {};
+};
+
 /// The contact of two spheres.
-struct NormalDistance {
+struct alignas(16) NormalDistance {
   Vec3 normal;
   Real distance = 0;
 };
@@ -299,7 +351,9 @@ struct StepData {
   /// Number of devices that share the step, each with its part of the rows; 1 in a world of one
   /// block. No result depends on it.
   std::uint32_t parts = 1;
-  Divisions divisions;  ///< if there are several parts
+  std::uint32_t part = 0;              ///< of the threads that use this object
+  PartState* states[kMostParts] = {};  ///< by part
+  Divisions divisions;                 ///< if there are several parts
 
   Vec3* motion = nullptr;              ///< by body
   SphereInstance* searched = nullptr;  ///< copy of the swept bounds, if there are several parts
@@ -307,6 +361,7 @@ struct StepData {
   cuda::ContactCount* pair_count = nullptr;
   NormalDistance* pair_results = nullptr;  ///< by pair
   std::uint8_t* pair_found = nullptr;      ///< by pair: 1 if it is a contact of two spheres
+  /// By part: a list of candidates, with memory for the same number of them.
   Candidate* candidates = nullptr;
   CandidateManifold* tested = nullptr;       ///< by candidate
   std::uint32_t* first_candidate = nullptr;  ///< by body a: list of candidates that have points
@@ -338,9 +393,8 @@ struct StepData {
   std::uint8_t* marked = nullptr;       ///< by label of an island
   std::uint8_t* constrained = nullptr;  ///< by body: StepBodies::constrained
 
-  std::uint16_t* row_bins = nullptr;   ///< by contact or joint, as RowSetup numbers them
-  std::uint32_t* bin_sizes = nullptr;  ///< by part, kBins + 1 numbers each
-  RowBins* bins = nullptr;             ///< by part
+  std::uint16_t* row_places = nullptr;  ///< RowPlace by contact or joint, as RowSetup numbers them
+  RowBins* bins = nullptr;              ///< by part
   /// By row of any kind, except inner rows: index of its contact or joint.
   std::uint32_t* row_contact = nullptr;
   StripedArray<soft_step::SphereRow> sphere_rows;
@@ -407,12 +461,19 @@ struct StepData {
     if (kind == soft_step::kKindOf<soft_step::ManifoldRow>) return capacity.manifold_rows;
     return world_joints.of_kind[kind - soft_step::kContactRowKinds];
   }
+  /// Of a part: capacity of its list of candidates.
+  JFPX_HD std::uint32_t candidate_capacity() const {
+    return parts == 1 ? capacity.candidates : capacity.candidates_of_part;
+  }
   /// First inner row of a block, kind and color, of kColorsPerClass + 1 colors: the last element is
   /// the end.
   JFPX_HD std::uint32_t* inner_begin(std::uint32_t block, soft_step::RowKind kind) const {
     constexpr std::uint32_t kStride = soft_step::kColorsPerClass + 1u;
     return inner_rows + (block * soft_step::kRowKinds + kind) * kStride;
   }
+
+  /// The state of the part of the threads that use this object.
+  JFPX_HD PartState& state() const { return *states[part]; }
 
   /// Solver index of a movable body, and the reverse.
   JFPX_HD std::uint32_t index_of(std::uint32_t body) const {
@@ -428,23 +489,13 @@ struct StepData {
     return {body.inverse_mass, body.inverse_inertia, ball.radius, ball.friction, ball.restitution};
   }
   /// The contacts of the step in progress, and those of the last completed step. The device selects
-  /// them, because the host does not track the number of completed steps.
+  /// them, because the host does not track the number of completed steps. Not valid before the
+  /// first barrier of a step.
   JFPX_HD const DeviceContacts& now() const { return contacts_of[parity()]; }
   JFPX_HD const DeviceContacts& last() const { return contacts_of[1 - parity()]; }
-  JFPX_HD soft_step::ContactView contacts() const {
-    soft_step::ContactView view = now().view;
-    view.sphere_count = counters->spheres;
-    view.manifold_count = counters->manifolds;
-    view.point_count = counters->points;
-    return view;
-  }
+  JFPX_HD soft_step::ContactView contacts() const { return with_sizes(now().view, state().now); }
   JFPX_HD soft_step::ContactView last_contacts() const {
-    soft_step::ContactView view = last().view;
-    const ContactSizes& sizes = counters->progress.contacts[1 - parity()];
-    view.sphere_count = sizes.spheres;
-    view.manifold_count = sizes.manifolds;
-    view.point_count = sizes.points;
-    return view;
+    return with_sizes(last().view, state().last);
   }
   /// Finds a contact of the last step in the range of its body a. EditProgram has marked contacts
   /// of removed bodies as uncolored.
@@ -500,8 +551,13 @@ struct StepData {
   }
 
  private:
-  JFPX_HD std::uint32_t parity() const {
-    return static_cast<std::uint32_t>(counters->progress.completed & 1);
+  JFPX_HD std::uint32_t parity() const { return state().parity; }
+  JFPX_HD static soft_step::ContactView with_sizes(soft_step::ContactView view,
+                                                   const ContactSizes& sizes) {
+    view.sphere_count = sizes.spheres;
+    view.manifold_count = sizes.manifolds;
+    view.point_count = sizes.points;
+    return view;
   }
 };
 

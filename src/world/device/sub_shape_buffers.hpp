@@ -32,10 +32,10 @@ class SubShapeBuffers {
     transfer.put(&bounds_, from.all_bounds, bounded, 0, kIndex);
     const std::size_t solids = bounded - ranges_.spheres();
     transfer.put(&solids_, hulls->on_device(transfer, from.solids, solids, &solids_on_device_),
-                 solids);
+                 solids, 0, ArrayIndex::equal);
     transfer.put(&walls_, from.walls, ranges_.all() - bounded);
     transfer.put(&parts_, from.parts, bounded, 0, kIndex);
-    transfer.put(&local_, from.local, part_count, part_room_);
+    transfer.put(&local_, from.local, part_count, part_room_, ArrayIndex::equal);
   }
 
   /// Reserves memory for the sub-shapes of both objects. complete() must follow.
