@@ -18,6 +18,7 @@
 #include "src/world/device/prepare_program.hpp"
 #include "src/world/device/scratch_buffers.hpp"
 #include "src/world/device/solve_program.hpp"
+#include "src/world/device/step_divider.hpp"
 #include "src/world/device/sub_shape_buffers.hpp"
 
 #include <algorithm>
@@ -81,10 +82,10 @@ class DeviceStep final : public DeviceWorld {
     }
     const soft_step::ContactView kept = last->view();
     data_.parts = bodies.has_blocks() ? device_->parts() : 1;
-    start_divisions(static_cast<std::uint32_t>(bodies.capacity()),
-                    {kept.sphere_count, kept.manifold_count, 0, 0});
-    scale_divisions(static_cast<std::uint32_t>(bodies.capacity()),
-                    static_cast<std::uint32_t>(bodies.size()), sub_shapes->view().ranges.bounded());
+    const auto slots = static_cast<std::uint32_t>(bodies.capacity());
+    divider_.start(&data_, slots, {kept.sphere_count, kept.manifold_count, 0, 0});
+    divider_.scale(&data_, slots, static_cast<std::uint32_t>(bodies.size()),
+                   sub_shapes->view().ranges.bounded());
     device_->divide(data_.parts, data_.divisions);
     has_numbers_ = false;
     bodies_.upload(transfer_, bodies, room_, &data_);
@@ -268,7 +269,9 @@ class DeviceStep final : public DeviceWorld {
   }
 
   Vec3 fetch_position(std::uint32_t body) override {
-    return fetch(data_.step.motion.position + body);
+    std::vector<Vec3> position(1);
+    transfer_.read(data_.step.motion.position + body, &position);
+    return position[0];
   }
 
   void fetch_states(MotionArrays* moving, ThreadPool* pool) override {
@@ -431,165 +434,23 @@ class DeviceStep final : public DeviceWorld {
     is_ready_ = true;
   }
 
-  /// Divides the step among the devices, so that each has about as many contacts and bodies.
+  /// Divides the step among the devices.
   void divide() {
     const BodyView& bodies = data_.step.bodies;
     const std::uint32_t before = data_.parts;
     data_.parts = bodies.has_blocks ? device_->parts() : 1;
     if (data_.parts > 1) {
-      if (before == 1) start_divisions(bodies.capacity, {});
-      if (has_numbers_ && !is_divided()) divide_contacts();
-      scale_divisions(bodies.capacity, bodies.count,
-                      data_.swept_bounds.sub_shapes.ranges.bounded());
+      if (before == 1) divider_.start(&data_, bodies.capacity, {});
+      if (has_numbers_ && !divider_.is_current(numbers())) {
+        divider_.renew(&data_, last_contacts().view().view, numbers());
+      }
+      divider_.scale(&data_, bodies.capacity, bodies.count,
+                     data_.swept_bounds.sub_shapes.ranges.bounded());
     }
     device_->divide(data_.parts, data_.divisions);
   }
-
-  /// The division before a step by several parts. @param contacts of the last step, if known
-  void start_divisions(std::uint32_t slots, const ContactSizes& contacts) {
-    const auto equal = [&](std::uint32_t n) {
-      return n > 0 ? Division::equal(n, data_.parts) : Division::unknown();
-    };
-    Divisions& to = data_.divisions;
-    to.slots = Division::equal(slots, data_.parts);
-    to.blocks = Division::equal(slots / kBodiesPerBlock, data_.parts);
-    to.pairs = Division::unknown();
-    to.spheres = equal(contacts.spheres);
-    to.manifolds = equal(contacts.manifolds);
-    to.contacts = equal(contacts.spheres + contacts.manifolds);
-    divided_ = {};
-  }
-
-  /// Whether the division fits the step: pages are moved when it changes.
-  bool is_divided() const {
-    constexpr std::uint64_t kMostSteps = 256;
-    const auto is_close = [](std::uint64_t a, std::uint64_t b) {
-      const std::uint64_t difference = a > b ? a - b : b - a;
-      return difference <= std::max(b / 8, std::uint64_t{1024});
-    };
-    return data_.parts == 1 ||
-           (divided_.has_contacts && known_.completed < divided_.completed + kMostSteps &&
-            is_close(contact_count(), divided_.contacts) && is_close(pairs_, divided_.pairs) &&
-            is_close(blocks_.places, divided_.places));
-  }
-  std::uint64_t contact_count() const {
-    const ContactSizes& sizes = last_contacts().sizes();
-    return std::uint64_t{sizes.spheres} + sizes.manifolds;
-  }
-
-  static constexpr std::uint64_t kContactLoad = 2, kBodyLoad = 5;  ///< measured: several_gpus.md
-  static std::uint64_t load_of(std::uint64_t contacts, std::uint64_t bodies) {
-    return kContactLoad * contacts + kBodyLoad * bodies;
-  }
-
-  /// Divides the slots by the contacts of the last step, and what belongs to the bodies by slots.
-  void divide_contacts() {
-    const ContactSizes& sizes = last_contacts().sizes();
-    const BodyView& bodies = data_.step.bodies;
-    const soft_step::ContactView contacts = last_contacts().view().view;
-    const SubShapeView& sub_shapes = data_.swept_bounds.sub_shapes;
-    const auto spheres = read_list(contacts.spheres, sizes.spheres);
-    const auto manifolds = read_list(contacts.manifolds, sizes.manifolds);
-    const auto pairs = read_list(data_.pairs, pairs_);
-    const auto sub_shape_bodies = read_list(sub_shapes.bodies, sub_shapes.ranges.bounded());
-    const auto slot_of_sphere = [&](std::uint32_t i) { return spheres[i].key.a; };
-    const auto slot_of_manifold = [&](std::uint32_t i) { return manifolds[i].key.a; };
-    // The longer list decides. Both are sorted by slot.
-    const bool by_spheres = sizes.spheres >= sizes.manifolds;
-    const std::uint32_t count = by_spheres ? sizes.spheres : sizes.manifolds;
-    const auto slot_of = [&](std::uint32_t i) {
-      return by_spheres ? slot_of_sphere(i) : slot_of_manifold(i);
-    };
-    std::vector<std::uint32_t> first_bodies(blocks_.placed());
-    device_->download(first_bodies.data(), data_.first_of_block, first_bodies.size());
-    device_->wait();
-    Divisions to = data_.divisions;
-    for (std::uint32_t part = 1; part < data_.parts; ++part) {
-      const std::uint64_t target = load_of(count, bodies.capacity) * part / data_.parts;
-      const std::uint32_t contact =
-          first_of(count, [&](std::uint32_t i) { return load_of(i, slot_of(i)) >= target; });
-      const std::uint64_t of_contacts = std::min(target, kContactLoad * contact);
-      auto slot = static_cast<std::uint32_t>((target - of_contacts) / kBodyLoad);
-      if (contact > 0) slot = std::max(slot, slot_of(contact - 1) + 1);
-      slot = std::min(slot, contact < count ? slot_of(contact) : bodies.capacity);
-      slot = std::max(slot, to.slots.begin[part - 1]);
-      to.slots.begin[part] = slot;
-      to.spheres.begin[part] =
-          first_of(sizes.spheres, [&](std::uint32_t i) { return slot_of_sphere(i) >= slot; });
-      to.manifolds.begin[part] =
-          first_of(sizes.manifolds, [&](std::uint32_t i) { return slot_of_manifold(i) >= slot; });
-      to.contacts.begin[part] =
-          by_spheres ? to.spheres.begin[part] : sizes.spheres + to.manifolds.begin[part];
-      to.pairs.begin[part] = first_of(pairs_, [&](std::uint32_t i) {
-        const std::uint32_t a = pairs[i].a;
-        return a >= sub_shape_bodies.size() || sub_shape_bodies[a] >= slot;
-      });
-      // Bodies without a place are in blocks in any order.
-      to.blocks.begin[part] =
-          blocks_.places > 0
-              ? static_cast<std::uint32_t>(std::ranges::count_if(
-                    first_bodies, [&](std::uint32_t body) { return body < slot; }))
-              : static_cast<std::uint32_t>(std::uint64_t{blocks_.all()} * slot / bodies.capacity);
-    }
-    data_.divisions = to;
-    divided_ = {true, known_.completed, contact_count(), pairs_, blocks_.places};
-  }
-  /// Lowest i < n for which a condition holds that does not hold for lower ones and holds for all
-  /// higher ones; n if there is none.
-  template <class Condition>
-  static std::uint32_t first_of(std::uint32_t n, const Condition& condition) {
-    std::uint32_t begin = 0;
-    for (std::uint32_t end = n; begin < end;) {
-      const std::uint32_t middle = begin + (end - begin) / 2;
-      if (condition(middle)) {
-        end = middle;
-      } else {
-        begin = middle + 1;
-      }
-    }
-    return begin;
-  }
-  template <class T>
-  T fetch(const T* from) const {
-    T value;
-    device_->download(&value, from, 1);
-    device_->wait();
-    return value;
-  }
-  /// Reads items of a list on the device. A short list is copied at once.
-  template <class T>
-  class ListReader {
-   public:
-    ListReader(const DeviceStep& step, const T* list, std::uint32_t size)
-        : step_(step), list_(list), size_(size) {
-      constexpr std::uint32_t kMostCopied = 4096;
-      if (size == 0 || size > kMostCopied) return;
-      items_.resize(size);
-      step.device_->download(items_.data(), list, size);
-      step.device_->wait();
-    }
-    std::uint32_t size() const { return size_; }
-    T operator[](std::uint32_t i) const {
-      return items_.empty() ? step_.fetch(list_ + i) : items_[i];
-    }
-
-   private:
-    const DeviceStep& step_;
-    const T* list_;
-    std::uint32_t size_;
-    std::vector<T> items_;
-  };
-  template <class T>
-  ListReader<T> read_list(const T* list, std::uint32_t size) const {
-    return ListReader<T>(*this, list, size);
-  }
-
-  /// Sets the divisions that follow from those of slots and of blocks.
-  void scale_divisions(std::uint32_t slots, std::uint32_t bodies, std::uint32_t sub_shapes) {
-    Divisions& divisions = data_.divisions;
-    divisions.bodies = divisions.slots.scaled(slots, bodies);
-    divisions.sub_shapes = divisions.slots.scaled(slots, sub_shapes);
-    divisions.places = divisions.blocks.scaled(1, kBodiesPerBlock);
+  typename StepDivider<Device>::Numbers numbers() const {
+    return {known_.completed, last_contacts().sizes(), pairs_, blocks_};
   }
 
   /// @param is_timed whether to mark the stages
@@ -669,7 +530,7 @@ class DeviceStep final : public DeviceWorld {
       has_stepped_ = true;
       has_numbers_ = data_.parts > 1;
     }
-    if (has_numbers_ && !is_divided()) is_ready_ = false;
+    if (has_numbers_ && !divider_.is_current(numbers())) is_ready_ = false;
   }
 
   static Result result_of(const Counters& counters) {
@@ -707,6 +568,7 @@ class DeviceStep final : public DeviceWorld {
 
   std::unique_ptr<Device> device_;
   Transfer<Device> transfer_, edit_transfer_;
+  StepDivider<Device> divider_{transfer_};
   StepData data_;
   Capacity capacity_;
   BodyBuffers<Device> bodies_;
@@ -728,11 +590,6 @@ class DeviceStep final : public DeviceWorld {
   std::uint32_t pairs_ = 0;          ///< of swept bounds, in the last step
   BlockCounts blocks_;               ///< in the last step
   bool has_numbers_ = false;  ///< whether the last step had several parts, which number the blocks
-  /// The step by which the divisions were made.
-  struct {
-    bool has_contacts = false;  ///< whether there was one
-    std::uint64_t completed = 0, contacts = 0, pairs = 0, places = 0;
-  } divided_;
   bool has_stepped_ = false;  ///< whether a step was completed since the upload
   bool is_queued_ = false;    ///< whether the host has enqueued or captured steps
   bool is_ready_ = false;     ///< whether all lists have the room of capacity_

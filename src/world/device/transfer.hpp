@@ -45,6 +45,13 @@ class Transfer {
   void get(std::vector<T>* to, const Buffer<T>& from) const {
     device_->download(to->data(), from.data(), to->size());
   }
+  /// Copies as many items as `to` has, and waits.
+  template <class T>
+  void read(const T* from, std::vector<T>* to) const {
+    if (to->empty()) return;
+    device_->download(to->data(), from, to->size());
+    device_->wait();
+  }
   /// Reserves `count` items and discards the contents. @returns the address
   /// @param layout if several devices share the array
   template <class T>
