@@ -6,6 +6,7 @@
 #include "src/base/stopwatch.hpp"
 #include "src/scene/scene_validate.hpp"
 #include "src/sphere_collider/backend_table.hpp"
+#include "src/world/device/division.hpp"
 #include "src/world/world_impl.hpp"
 
 #include <algorithm>
@@ -343,8 +344,8 @@ namespace {
 void check_devices(const Scene& scene, const WorldSettings& settings) {
   if (settings.devices.empty()) return;
   const std::string there_are = "there are " + std::to_string(settings.devices.size()) + " devices";
-  if (settings.devices.size() > kMostDevices) {
-    throw InvalidArgument(there_are + "; at most " + std::to_string(kMostDevices) +
+  if (settings.devices.size() > device::kMostParts) {
+    throw InvalidArgument(there_are + "; at most " + std::to_string(device::kMostParts) +
                           " share a world");
   }
   if (settings.collider.backend == Backend::cpu) {

@@ -269,9 +269,9 @@ class DeviceStep final : public DeviceWorld {
   }
 
   Vec3 fetch_position(std::uint32_t body) override {
-    std::vector<Vec3> position(1);
-    transfer_.read(data_.step.motion.position + body, &position);
-    return position[0];
+    Vec3 position;
+    transfer_.read(data_.step.motion.position + body, 1, &position);
+    return position;
   }
 
   void fetch_states(MotionArrays* moving, ThreadPool* pool) override {

@@ -129,11 +129,9 @@ class DeviceWorld {
                               soft_step::ContactSet* set, DetectedContacts* detected) = 0;
 };
 
-inline constexpr std::size_t kMostDevices = 8;  ///< that share a world
-
 /// A world on a CUDA device, or on several ones that share its steps and its memory.
-/// @param devices their numbers, 1 to kMostDevices of them. A device that occurs more than once has
-///   several parts of the work, for tests.
+/// @param devices their numbers, 1 to device::kMostParts of them. A device that occurs more than
+///   once has several parts of the work, for tests.
 /// @throws BackendUnavailable with the reason, DeviceError
 std::unique_ptr<DeviceWorld> make_device_world(const Scene& scene,
                                                const std::vector<int>& devices = {0});

@@ -79,7 +79,7 @@ class StepDivider {
       return by_spheres ? slot_of_sphere(i) : slot_of_manifold(i);
     };
     std::vector<std::uint32_t> first_bodies(numbers.blocks.placed());
-    transfer_.read(data->first_of_block, &first_bodies);
+    transfer_.read(data->first_of_block, first_bodies.size(), first_bodies.data());
     Divisions to = data->divisions;
     for (std::uint32_t part = 1; part < data->parts; ++part) {
       const std::uint64_t target = load_of(count, slots) * part / data->parts;
@@ -138,14 +138,14 @@ class StepDivider {
       constexpr std::uint32_t kMostCopied = 4096;
       if (size > kMostCopied) return;
       items_.resize(size);
-      transfer.read(list, &items_);
+      transfer.read(list, size, items_.data());
     }
     std::uint32_t size() const { return size_; }
     T operator[](std::uint32_t i) const {
       if (i < items_.size()) return items_[i];
-      std::vector<T> item(1);
-      transfer_.read(list_ + i, &item);
-      return item[0];
+      T item;
+      transfer_.read(list_ + i, 1, &item);
+      return item;
     }
 
    private:

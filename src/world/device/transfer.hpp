@@ -45,11 +45,11 @@ class Transfer {
   void get(std::vector<T>* to, const Buffer<T>& from) const {
     device_->download(to->data(), from.data(), to->size());
   }
-  /// Copies as many items as `to` has, and waits.
+  /// Copies items from any address on the device, and waits.
   template <class T>
-  void read(const T* from, std::vector<T>* to) const {
-    if (to->empty()) return;
-    device_->download(to->data(), from, to->size());
+  void read(const T* from, std::size_t count, T* to) const {
+    if (count == 0) return;
+    device_->download(to, from, count);
     device_->wait();
   }
   /// Reserves `count` items and discards the contents. @returns the address
