@@ -37,8 +37,9 @@ struct Division {
   /// Gives each part as many of n items.
   static Division equal(std::uint32_t n, std::uint32_t parts) {
     Division division;
+    const std::uint64_t all = n;
     for (std::uint32_t part = 0; part < parts; ++part) {
-      division.begin[part] = static_cast<std::uint32_t>(std::uint64_t{n} * part / parts);
+      division.begin[part] = static_cast<std::uint32_t>(all * part / parts);
     }
     return division;
   }
