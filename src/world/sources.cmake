@@ -54,6 +54,7 @@ list(APPEND JFPX_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/world_states_file.cpp)
 list(APPEND JFPX_CUDA_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/cuda/block_solve_programs.cu
+  ${CMAKE_CURRENT_LIST_DIR}/cuda/block_solve_spheres.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/contact_programs.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/row_programs.cu
   ${CMAKE_CURRENT_LIST_DIR}/cuda/shape_programs.cu

@@ -16,6 +16,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <thread>
 #include <tuple>
@@ -83,6 +84,11 @@ class HostTeam {
     template <class F>
     void once(const F& f) const {
       f();
+    }
+    std::uint32_t scan(std::uint32_t n, std::uint32_t* numbers) const {
+      const std::uint32_t sum = std::accumulate(numbers, numbers + n, 0u);
+      std::exclusive_scan(numbers, numbers + n, numbers, 0u);
+      return sum;
     }
     /// With one thread.
     template <class F>

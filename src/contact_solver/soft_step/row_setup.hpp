@@ -159,7 +159,7 @@ struct RowSetup {
                     const SphereProperties& b) const {
     const Real distance = contacts.distance(contact, 0);
     const Vec3& normal = contacts.normal(contact);
-    const KeptImpulse& kept = contacts.impulses[contacts.first_impulse(contact)];
+    const KeptImpulse kept = contacts.impulses[contacts.first_impulse(contact)];
     row->normal = flipped ? -normal : normal;
     row->distance = distance;
     // Penetrating spheres share the middle of the overlap, which conserves angular momentum.

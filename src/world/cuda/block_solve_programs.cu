@@ -1,4 +1,4 @@
-/// Kernels of the sweeps in worlds with blocks.
+/// Kernels of the sweeps in worlds with blocks and rows of several kinds.
 #include "src/world/cuda/program_kernel.cuh"
 #include "src/world/device/block_solve_program.hpp"
 
@@ -6,7 +6,6 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-template const void* program_kernel<device::BlockSolveProgram<device::kSphereRowKinds>>();
 template const void* program_kernel<device::BlockSolveProgram<soft_step::kContactRowKinds>>();
 template const void* program_kernel<device::BlockSolveProgram<soft_step::kRowKinds>>();
 

@@ -3,6 +3,7 @@
 
 #include "src/base/atomic.hpp"
 #include "src/base/cuda/warp.cuh"
+#include "src/world/device/shared_memory.hpp"
 #include "src/world/device/step_data.hpp"
 
 #include <cooperative_groups.h>
@@ -11,11 +12,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
-
-/// Shared memory of a block, with the alignment of four numbers.
-struct alignas(4 * sizeof(Real)) SharedPiece {
-  Real numbers[4];
-};
 
 /// Where the blocks of a device wait for those of the other devices of a launch.
 struct alignas(128) DeviceBarrier {
@@ -44,9 +40,6 @@ class GridTeam {
  public:
   static constexpr unsigned kThreads = device::tuning::kThreads;
 
-  /// Shared memory of a block for partition().
-  static constexpr std::size_t kPartitionBytes =
-      device::kMostParts * (device::kBins + 1) * sizeof(std::uint32_t);
   /// Words of scratch memory for a launch with this number of blocks on all devices.
   static std::size_t scratch_words(unsigned blocks) { return std::size_t{blocks} * (2 + kDigits); }
 
@@ -76,7 +69,7 @@ class GridTeam {
       return;
     }
     if (all_->count > 1) {
-      sync_devices();
+      sync_devices(*all_);
       return;
     }
     if (gridDim.x == 1) {
@@ -97,7 +90,7 @@ class GridTeam {
   /// work in the stream of the first device, and precedes all later work there.
   JFPX_HD void sync_parts() const {
 #if defined(__CUDA_ARCH__)
-    if (all_->count > 1) sync_devices();
+    if (all_->count > 1) sync_devices(*all_);
 #endif
   }
 
@@ -143,14 +136,7 @@ class GridTeam {
 #endif
     }
     /// Memory that the threads share: at most Program::kSharedBytes.
-    JFPX_HD void* shared(std::size_t) const {
-#if defined(__CUDA_ARCH__)
-      extern __shared__ SharedPiece shared_memory[];
-      return shared_memory;
-#else
-      return nullptr;
-#endif
-    }
+    JFPX_HD void* shared(std::size_t) const { return device::dynamic_shared_memory(); }
     /// Calls f(i) for all i < n, in any order, without a barrier.
     template <class F>
     JFPX_HD void for_each(std::uint32_t n, const F& f) const {
@@ -164,6 +150,23 @@ class GridTeam {
 #if defined(__CUDA_ARCH__)
       if (threadIdx.x == 0) f();
 #endif
+    }
+    /// Replaces each of n numbers by the sum of those before it. Begins after a barrier, and ends
+    /// with one. @returns the sum of all
+    JFPX_HD std::uint32_t scan([[maybe_unused]] std::uint32_t n,
+                               [[maybe_unused]] std::uint32_t* numbers) const {
+      std::uint32_t before = 0;
+#if defined(__CUDA_ARCH__)
+      for (std::uint32_t tile = 0; tile < n; tile += kThreads) {
+        const std::uint32_t i = tile + threadIdx.x;
+        std::uint32_t sum = 0;
+        const std::uint32_t first = before + block_scan(i < n ? numbers[i] : 0u, &sum);
+        if (i < n) numbers[i] = first;
+        before += sum;
+      }
+      __syncthreads();
+#endif
+      return before;
     }
     /// Calls f(thread, number of threads, sync) in each thread; all must call sync() equally often.
     template <class F>
@@ -313,7 +316,7 @@ class GridTeam {
   /// Calls place(i, position, bin) for all items i with bin_of(i) < device::kBins. The positions of
   /// a part are consecutive, ascend by bin, and start at a multiple of `capacity`. The order within
   /// a bin is arbitrary.
-  /// Uses kPartitionBytes of the shared memory of a block.
+  /// Uses device::kBytesOfBins of the shared memory of a block.
   /// @param lists  two lists of items, each of which is divided among the blocks of the launch
   /// @param bins   receives for each item part * (kBins + 1) + bin, or what bin_of() returns if it
   ///   is not a bin
@@ -328,7 +331,7 @@ class GridTeam {
                          const Place& place) const {
 #if defined(__CUDA_ARCH__)
     constexpr std::uint32_t kStride = device::kBins + 1;
-    auto* const next = static_cast<std::uint32_t*>(Threads().shared(kPartitionBytes));
+    auto* const next = static_cast<std::uint32_t*>(Threads().shared(device::kBytesOfBins));
     const device::Range of_first = chunk_of(lists.first, lists.division_of_first),
                         of_second = chunk_of(lists.second, lists.division_of_second);
     const std::uint32_t first_count = of_first.end - of_first.begin,
@@ -483,18 +486,18 @@ class GridTeam {
   /// Barrier of all blocks of all devices. The last block of each device exchanges signals with the
   /// other devices, so that only two fences of a device are of the whole system: such a fence waits
   /// for all outstanding accesses to other devices.
-  __noinline__ __device__ void sync_devices() const {
+  __noinline__ __device__ static void sync_devices(const TeamParts& all) {
     __syncthreads();
     bool ends = false;
     if (threadIdx.x == 0) {
       constexpr std::uint32_t kBarrier = 0x10000u;
-      DeviceBarrier* const barrier = all_->barriers[all_->mine];
+      DeviceBarrier* const barrier = all.barriers[all.mine];
       __threadfence();  // the last block makes the writes of all visible to other devices
       const std::uint32_t increment = blockIdx.x == 0 ? kBarrier - (gridDim.x - 1) : 1;
       const std::uint32_t before = atomic_add(&barrier->arrived, increment);
       const std::uint32_t after = before + increment;
       if (before / kBarrier != after / kBarrier) {
-        wait_for_devices(barrier, after);
+        wait_for_devices(all, barrier, after);
         store_shared(&barrier->passed, after);
       } else {
         while (!has_passed(&barrier->passed, before)) {
@@ -514,18 +517,19 @@ class GridTeam {
   }
   /// Signals to the other devices that all blocks of this one have arrived, and waits for theirs.
   /// @param arrived DeviceBarrier::arrived of this device
-  __device__ void wait_for_devices(DeviceBarrier* barrier, std::uint32_t arrived) const {
+  __device__ static void wait_for_devices(const TeamParts& all, DeviceBarrier* barrier,
+                                          std::uint32_t arrived) {
     constexpr std::uint32_t kPollsPerLook = 1024;
-    const std::uint32_t mine = all_->mine, count = all_->count;
+    const std::uint32_t mine = all.mine, count = all.count;
     __threadfence_system();
     for (std::uint32_t part = 0; part < count; ++part) {
-      if (part != mine) store_shared(&all_->barriers[part]->signals[mine], arrived);
+      if (part != mine) store_shared(&all.barriers[part]->signals[mine], arrived);
     }
     for (std::uint32_t part = 0; part < count; ++part) {
       if (part == mine) continue;
       const std::uint32_t before = arrived - 0x10000u;
       for (std::uint32_t polls = 1; !has_passed(&barrier->signals[part], before); ++polls) {
-        if (polls % kPollsPerLook != 0 || load_shared(all_->ended) == 0) continue;
+        if (polls % kPollsPerLook != 0 || load_shared(all.ended) == 0) continue;
         store_shared(&barrier->ended, 1u);
         __threadfence();
         return;

@@ -10,7 +10,7 @@ namespace cuda {
 
 /// The kernel of a program. Its parameters are the program and those of the GridTeam
 /// (program_kernel.cuh). Instantiated in one of the files
-/// *_programs.cu; a program that is missing there is a link error.
+/// *_programs.cu or block_solve_spheres.cu; a program that is missing there is a link error.
 template <class Program>
 const void* program_kernel();
 

@@ -11,7 +11,11 @@ inline namespace JFPX_ABI {
 namespace cuda {
 
 template const void* program_kernel<device::MatchProgram>();
-template const void* program_kernel<device::PrepareProgram>();
+template const void* program_kernel<device::PrepareProgram<device::kPrepareOneBlock>>();
+template const void* program_kernel<device::PrepareProgram<device::kPrepareBodies>>();
+template const void* program_kernel<device::PrepareProgram<device::kPlaceRows>>();
+template const void* program_kernel<device::PrepareProgram<device::kBuildInnerRows>>();
+template const void* program_kernel<device::PrepareProgram<device::kBuildRows>>();
 template const void* program_kernel<device::CommitProgram>();
 template const void* program_kernel<device::EditProgram>();
 template const void* program_kernel<device::MergeProgram>();

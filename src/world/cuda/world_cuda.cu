@@ -371,7 +371,6 @@ class CudaDevice {
 
   /// At least the static shared memory of the programs with the most dynamic shared memory.
   static constexpr std::size_t kStaticShared = 4096;
-  static_assert(device::PrepareProgram::kSharedBytes >= GridTeam::kPartitionBytes);
 
   /// Bytes of shared memory of a block.
   template <class Program>
@@ -565,7 +564,11 @@ class CudaDevice {
   TeamParts parts_;
   std::tuple<Limits<device::ForceProgram>, Limits<device::BoundsProgram>,
              Limits<device::SphereProgram>, Limits<device::ShapeProgram>,
-             Limits<device::MatchProgram>, Limits<device::PrepareProgram>,
+             Limits<device::MatchProgram>, Limits<device::PrepareProgram<device::kPrepareOneBlock>>,
+             Limits<device::PrepareProgram<device::kPrepareBodies>>,
+             Limits<device::PrepareProgram<device::kPlaceRows>>,
+             Limits<device::PrepareProgram<device::kBuildInnerRows>>,
+             Limits<device::PrepareProgram<device::kBuildRows>>,
              Limits<device::SolveProgram<soft_step::kContactRowKinds>>,
              Limits<device::SolveProgram<soft_step::kRowKinds>>,
              Limits<device::BlockSolveProgram<device::kSphereRowKinds>>,

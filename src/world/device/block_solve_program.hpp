@@ -1,6 +1,7 @@
 /// Substeps and restitution of a soft step on a device, for worlds that are divided into blocks.
 #pragma once
 
+#include "src/world/device/ahead.hpp"
 #include "src/world/device/block_motion.hpp"
 #include "src/world/device/row_solver.hpp"
 #include "src/world/device/step_data.hpp"
@@ -48,8 +49,11 @@ struct BlockPhase {
 template <soft_step::RowKind kKinds>
 struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
   using Motion = BlockMotion<kKinds>;
+  static constexpr std::size_t kRowsBegin = (Motion::kBytes / 16 + 1) * 16;
+  using RowAhead = Ahead<soft_step::SphereRow, kRowsBegin>;
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
-  static constexpr std::size_t kSharedBytes = Motion::kBytes;
+  static constexpr std::size_t kSharedBytes =
+      kKinds == kSphereRowKinds ? kRowsBegin + RowAhead::kBytes : Motion::kBytes;
   using RowSolver<kKinds, BodyMotion>::data;
 
   /// The sequence is that of SoftStep::solve().
@@ -142,7 +146,8 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     const std::uint32_t colors = sweep.bins.crossing_colors;
     const auto has_color = [&](std::uint32_t color) { return color < colors; };
     team.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
-      for_colors(begin, has_color, thread, count, sync, [&](std::uint32_t r, const auto& row) {
+      ThreadRows rows(data.sphere_rows, begin, thread, count);
+      rows.run(has_color, sync, [&](std::uint32_t r, const auto& row) {
         typename Base::RowItem item;
         this->begin_row(r, row, &item);
         this->read_bodies(&item);
@@ -172,37 +177,54 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     }
   }
 
-  /// Calls solve(r, row) for the rows of spheres of each color with the rows of a thread, and
-  /// sync() after each color. A thread loads its next row before it solves a row.
-  /// @param begin the first rows by color, and the end
-  /// @param has_color whether a color is below the end of the colors
-  template <class HasColor, class Sync, class Solve>
-  [[gnu::always_inline]] JFPX_HD void for_colors(const std::uint32_t* begin,
-                                                 const HasColor& has_color, std::uint32_t thread,
-                                                 std::uint32_t count, const Sync& sync,
-                                                 const Solve& solve) const {
-    const std::uint32_t last = begin[soft_step::kColorsPerClass];
-    soft_step::SphereRow ahead;
-    std::uint32_t next = last;  // a part may have no rows of colors that other parts have
-    const auto load = [&](std::uint32_t color, std::uint32_t row) {
-      next = row;
-      while (next >= begin[color + 1] && begin[color + 1] < last) {
-        ++color;
-        next = begin[color] + thread;
-      }
-      if (next < last) ahead = data.sphere_rows.load(next);
-    };
-    if (begin[0] < last) load(0, begin[0] + thread);
-    for (std::uint32_t color = 0; has_color(color); ++color) {
-      while (next < begin[color + 1]) {
-        const soft_step::SphereRow row = ahead;
-        const std::uint32_t r = next;
-        load(color, r + count);
-        solve(r, row);
-      }
-      sync();
+  /// The rows of spheres of a thread, color by color. A thread loads its next row before it solves
+  /// a row.
+  class ThreadRows {
+   public:
+    /// Starts to load the first row.
+    /// @param begin  the first rows by color, and the end
+    /// @param thread number of the thread among `count` that share the rows of a color
+    JFPX_HD ThreadRows(const StripedArray<soft_step::SphereRow>& rows, const std::uint32_t* begin,
+                       std::uint32_t thread, std::uint32_t count)
+        : rows_(rows), begin_(begin), thread_(thread), count_(count) {
+      load(0, begin[0] + thread);
     }
-  }
+
+    /// Calls solve(r, row) for the rows of each color, and sync() after each color.
+    /// @param has_color whether a color is below the end of the colors
+    template <class HasColor, class Sync, class Solve>
+    [[gnu::always_inline]] JFPX_HD void run(const HasColor& has_color, const Sync& sync,
+                                            const Solve& solve) {
+      for (std::uint32_t color = 0; has_color(color); ++color) {
+        while (next_ < begin_[color + 1]) {
+          const std::uint32_t r = next_;
+          const soft_step::SphereRow row = ahead_.get();
+          load(color, r + count_);
+          solve(r, row);
+        }
+        sync();
+      }
+    }
+
+   private:
+    /// Starts to load a row of a color, or the first one of a later color.
+    JFPX_HD void load(std::uint32_t color, std::uint32_t row) {
+      const std::uint32_t end = begin_[soft_step::kColorsPerClass];
+      next_ = row;
+      // A part may have no rows of colors that other parts have.
+      while (next_ >= begin_[color + 1] && begin_[color + 1] < end) {
+        ++color;
+        next_ = begin_[color] + thread_;
+      }
+      if (next_ < end) ahead_.load(rows_, next_);
+    }
+
+    const StripedArray<soft_step::SphereRow>& rows_;
+    const std::uint32_t* begin_;
+    std::uint32_t thread_, count_;
+    std::uint32_t next_ = 0;  ///< the row that is loaded, or a number beyond all rows
+    RowAhead ahead_;
+  };
 
   template <class Team>
   [[gnu::always_inline]] JFPX_HD void run_blocks(const Team& team, const Sweep& sweep,
@@ -226,38 +248,29 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     const std::uint32_t count = places.end - places.begin;
     const Motion motion(threads.shared(kSharedBytes));
     const bool has_inner = phase.inner_sweep() != SweepKind::none && block < blocks.placed();
-    threads.for_each(
-        count, [&](std::uint32_t i) { complete_body(before, phase, motion, i, places.begin + i); });
-    if (has_inner) {
-      constexpr std::uint32_t kEnds = soft_step::kColorsPerClass + 1u;
-      threads.for_each(kKinds * kEnds, [&](std::uint32_t i) {
-        const auto kind = static_cast<soft_step::RowKind>(i / kEnds);
-        motion.row_begin(kind)[i % kEnds] = d.inner_begin(block, kind)[i % kEnds];
+    constexpr std::uint32_t kEnds = soft_step::kColorsPerClass + 1u;
+    threads.for_each(kKinds * kEnds, [&](std::uint32_t i) {
+      const auto kind = static_cast<soft_step::RowKind>(i / kEnds);
+      motion.row_begin(kind)[i % kEnds] = has_inner ? d.inner_begin(block, kind)[i % kEnds] : 0;
+    });
+    const auto complete = [&] {
+      complete_bodies(threads, before, phase, motion, places);
+      threads.sync();
+    };
+    if constexpr (kKinds == kSphereRowKinds) {
+      threads.sync();
+      solve_inner_spheres(threads, phase, complete, motion, places.begin);
+    } else {
+      complete();
+      visit_operation(phase.inner_sweep(), [&](const auto& operation) {
+        solve_inner_kinds(threads, phase, operation, motion, places.begin);
       });
     }
     if (phase.stage() == BodyStage::finish) return;
-    threads.sync();
-    if (has_inner) {
-      visit_operation(phase.inner_sweep(), [&](const auto& operation) {
-        solve_inner(threads, phase, operation, motion, places.begin);
-      });
-    }
     threads.for_each(count, [&](std::uint32_t i) { publish(motion, i, places.begin + i); });
   }
 
   /// Solves the inner rows of a block.
-  template <class Threads, class Operation>
-  [[gnu::always_inline]] JFPX_HD void solve_inner(const Threads& threads, const BlockPhase& phase,
-                                                  const Operation& operation, const Motion& motion,
-                                                  std::uint32_t first_place) const {
-    if constexpr (kKinds == kSphereRowKinds) {
-      solve_inner_spheres(threads, phase, operation, motion, first_place);
-    } else {
-      solve_inner_kinds(threads, phase, operation, motion, first_place);
-    }
-  }
-
-  /// solve_inner() for rows of several kinds.
   template <class Threads, class Operation>
   [[gnu::always_inline]] JFPX_HD void solve_inner_kinds(const Threads& threads,
                                                         const BlockPhase& phase,
@@ -288,11 +301,12 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     }
   }
 
-  /// solve_inner() if all rows are of spheres.
-  template <class Threads, class Operation>
+  /// Calls complete(), then solves the inner rows of a block, which are all of spheres. The first
+  /// rows are loaded during complete().
+  template <class Threads, class Complete>
   [[gnu::always_inline]] JFPX_HD void solve_inner_spheres(const Threads& threads,
                                                           const BlockPhase& phase,
-                                                          const Operation& operation,
+                                                          const Complete& complete,
                                                           const Motion& motion,
                                                           std::uint32_t first_place) const {
     const std::uint32_t* const begin = motion.row_begin(0);
@@ -300,8 +314,12 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
       return begin[color] < begin[soft_step::kColorsPerClass];
     };
     threads.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto& sync) {
-      for_colors(begin, has_color, thread, count, sync, [&](std::uint32_t r, const auto& row) {
-        solve_inner_row(phase, operation, motion, first_place, r, row);
+      ThreadRows rows(data.sphere_rows, begin, thread, count);
+      complete();
+      visit_operation(phase.inner_sweep(), [&](const auto& operation) {
+        rows.run(has_color, sync, [&](std::uint32_t r, const auto& row) {
+          solve_inner_row(phase, operation, motion, first_place, r, row);
+        });
       });
     });
   }
@@ -324,7 +342,7 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     const std::uint32_t* const body_at = d.body_at + first_place;
     SolverBody a = motion.load(row.a), b = motion.load(row.b);
     const Vec3 shift_a = a.shift, shift_b = b.shift;
-    const Impact impact{{d.substep_bodies, first_place}, row.a};
+    const Impact impact({d.substep_bodies, first_place}, d.columns, row.a);
     soft_step::RowContext<typename Row::Part, Impact> context{
         {&a, &b, nullptr, nullptr}, d.parts_of(row), &impact};
     Mat3 inertia_a, inertia_b;
@@ -346,12 +364,11 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     Real restitution = 0;
     if constexpr (kIsSphere) restitution = row.restitution;
     operation.template run<false>(&row, context);
-    const auto write = [&](std::uint32_t i, const SolverBody& body, const Vec3& shift,
-                           const soft_step::FreeMotion& change) {
+    const auto write = [&](std::uint32_t i, const SolverBody& body, const Vec3& shift) {
       motion.store_velocities(i, body);
       if constexpr (Operation::kMovesBodies) {
         const bool moves = !(body.shift == shift);
-        if (!moves && !Row::kReadsRotation && !impact.is_pending) return;
+        if (!moves && !Row::kReadsRotation) return;
         typename Motion::Changes changes = motion.changes(i);
         if (moves) {
           motion.store_shift(i, body);
@@ -361,17 +378,11 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
           motion.store_rotation(i, body);
           changes.rotation = true;
         }
-        if (impact.is_pending) {
-          const BodyMotion stored(d.columns, first_place + i);
-          soft_step::FreeMotion free = stored.read_free({});
-          free.add(change.velocity, change.angular_velocity);
-          stored.write_free(free);
-        }
         motion.set_changes(i, changes);
       }
     };
-    write(row.a, a, shift_a, impact.of_a);
-    write(row.b, b, shift_b, impact.of_b);
+    write(row.a, a, shift_a);
+    write(row.b, b, shift_b);
     if constexpr (Operation::kChangesRow) {
       if constexpr (kIsSphere) {
         this->store_sphere_row(row, restitution, r);
@@ -394,28 +405,69 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     stored.write(0, body);
   }
 
-  /// Completes the sweep before, and puts the motion of the body into shared memory.
-  /// @param place of the body in its block
-  /// @param i     its solver index
-  JFPX_HD void complete_body(const Sweep& before, const BlockPhase& phase, const Motion& motion,
-                             std::uint32_t place, std::uint32_t i) const {
+  /// A body whose sweep is completed.
+  struct BodyWork : ItemBody {
+    std::uint32_t body = kNone, first_fixed = kNone;
+    soft_step::SubstepBody constants;  ///< if it is accelerated
+    Quat orientation;                  ///< if it moves, or is accelerated with a gyroscopic term
+    BodyFree free;                     ///< if it is accelerated
+  };
+
+  /// Completes the sweep before for all bodies of a block, and puts their motion into shared
+  /// memory.
+  template <class Threads>
+  [[gnu::always_inline]] JFPX_HD void complete_bodies(const Threads& threads, const Sweep& before,
+                                                      const BlockPhase& phase, const Motion& motion,
+                                                      const Range& places) const {
+    const std::uint32_t bodies = places.end - places.begin;
+    const BodyStage stage = phase.stage();
+    threads.for_each_thread([&](std::uint32_t thread, std::uint32_t count, const auto&) {
+      // A thread loads its next body while it completes one.
+      BodyWork next;
+      if (thread < bodies) begin_body(places.begin + thread, &next);
+      for (std::uint32_t i = thread; i < bodies; i += count) {
+        BodyWork work = next;
+        load_body(stage, &work);
+        if (i + count < bodies) begin_body(places.begin + i + count, &next);
+        complete_body(before, phase, motion, i, &work);
+      }
+    });
+  }
+
+  /// @param i solver index
+  JFPX_HD void begin_body(std::uint32_t i, BodyWork* work) const {
+    work->index = i;
+    work->template read<Motion::kHasRotation>(data);
+    work->body = data.body_at[i];
+    work->first_fixed = data.first_fixed[i];
+  }
+
+  /// Loads what the completion of a stage reads besides begin_body().
+  JFPX_HD void load_body(BodyStage stage, BodyWork* work) const {
     const StepData& d = data;
-    ItemBody item;
-    item.index = i;
-    item.template read<Motion::kHasRotation>(d);
-    if (!(item.motion.inverse_mass > 0)) {
+    if (!(work->motion.inverse_mass > 0)) return;
+    if (stage == BodyStage::move) work->orientation = d.orientation[work->index];
+    if (stage == BodyStage::accelerate) {
+      work->constants = d.substep_bodies.load(work->index);
+      work->free.read(BodyMotion(d.columns, work->index), work->version);
+    }
+  }
+
+  /// @param place of the body in its block
+  JFPX_HD void complete_body(const Sweep& before, const BlockPhase& phase, const Motion& motion,
+                             std::uint32_t place, BodyWork* work) const {
+    const StepData& d = data;
+    const std::uint32_t i = work->index;
+    SolverBody& body = work->motion;
+    if (!(body.inverse_mass > 0)) {
       motion.store_velocities(place, {});
       return;
     }
     typename Motion::Changes changes;
-    const std::uint32_t first_fixed = d.first_fixed[i];
-    SolverBody& body = item.motion;
-    const BodyMotion stored(d.columns, i);
-    BodyFree free;
     visit_operation(phase.fixed_sweep(), [&](const auto& operation) {
       const Vec3 shift = body.shift;
-      for (std::uint32_t r = first_fixed; r != kNone; r = d.next_fixed[r]) {
-        this->solve_fixed(before, operation, r, &item, &free);
+      for (std::uint32_t r = work->first_fixed; r != kNone; r = d.next_fixed[r]) {
+        this->solve_fixed(before, operation, r, work, &work->free);
         if constexpr (Motion::kHasRotation) changes.rotation = true;
       }
       if (!(body.shift == shift)) changes.shift = true;
@@ -423,28 +475,27 @@ struct BlockSolveProgram : RowSolver<kKinds, BodyMotion> {
     switch (phase.stage()) {
       case BodyStage::none:
         break;
-      case BodyStage::finish: {
-        const std::uint32_t index = d.body_at[i];
-        d.step.solver[index] = body;
-        d.step.orientation[index] = d.orientation[i];
-        this->check_state(index);
+      case BodyStage::finish:
+        d.step.solver[work->body] = body;
+        d.step.orientation[work->body] = d.orientation[i];
+        this->check_state(work->body);
         return;
-      }
       case BodyStage::move:
-        this->move(d.body_at[i], i, phase.sweeps.moves(phase.sweep), &body);
+        this->move(work->body, i, phase.sweeps.moves(phase.sweep), work->orientation, &body);
         changes.shift = changes.rotation = true;
         break;
       case BodyStage::accelerate: {
         const Vec3 shift = body.shift;
-        free.read(stored, item.version);
-        d.step.accelerate(d.body_at[i], d.substep_bodies.load(i), d.orientation[i], &body,
-                          &free.motion, false);
-        free.is_changed = true;
+        if (work->constants.has(soft_step::SubstepBody::kIsGyroscopic)) {
+          work->orientation = d.orientation[i];
+        }
+        d.step.accelerate(work->body, work->constants, work->orientation, &body, &work->free.motion,
+                          false);
+        BodyMotion(d.columns, i).write_free(work->free.motion);
         if (!(body.shift == shift)) changes.shift = true;
         break;
       }
     }
-    if (free.is_changed) stored.write_free(free.motion);
     if constexpr (!Motion::kHasRotation) changes.rotation = false;
     motion.store_velocities(place, body);
     motion.store_shift(place, body);

@@ -302,20 +302,44 @@ class DeviceStep final : public DeviceWorld {
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
 
-  /// Loads the programs of the solver for the world as it is now, because steps that are captured
-  /// must not load a program.
+  /// Calls f(program, items) for the programs between the contacts and the end of a step, which
+  /// depend on the blocks and the joints of the world. @param items for Device::run()
+  template <class F>
+  void visit_solver(const F& f) const {
+    const StepData& d = data_;
+    const ContactSizes& last = last_contacts().sizes();
+    const std::size_t bodies = d.step.bodies.count;
+    const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
+    const bool has_joints = d.world_joints.count > 0;
+    if (d.step.bodies.has_blocks) {
+      f(PrepareProgram<kPrepareBodies>{d}, contacts);
+      f(PrepareProgram<kPlaceRows>{d}, contacts);
+      f(PrepareProgram<kBuildInnerRows>{d}, contacts);
+      f(PrepareProgram<kBuildRows>{d}, contacts);
+      if (has_joints) {
+        f(BlockSolveProgram<soft_step::kRowKinds>{d}, contacts);
+      } else {  // one of them returns at once
+        f(BlockSolveProgram<kSphereRowKinds>{d}, contacts);
+        f(BlockSolveProgram<soft_step::kContactRowKinds>{d}, contacts);
+      }
+      return;
+    }
+    f(PrepareProgram<kPrepareOneBlock>{d}, contacts);
+    // More threads than rows: rows of manifolds need the caches of several multiprocessors.
+    const std::size_t rows = std::max<std::size_t>(contacts, 4 * std::size_t{last.manifolds});
+    if (has_joints) {
+      f(SolveProgram<soft_step::kRowKinds>{d}, rows);
+    } else {
+      f(SolveProgram<soft_step::kContactRowKinds>{d}, rows);
+    }
+  }
+
+  /// Loads these programs for the world as it is now, because steps that are captured must not load
+  /// a program.
   void load_solver() {
     if (!has_stepped_) return;  // capture() requires a step
-    const bool has_joints = data_.world_joints.count > 0;
-    if (!data_.step.bodies.has_blocks) {
-      has_joints ? device_->template load<SolveProgram<soft_step::kRowKinds>>()
-                 : device_->template load<SolveProgram<soft_step::kContactRowKinds>>();
-    } else if (has_joints) {
-      device_->template load<BlockSolveProgram<soft_step::kRowKinds>>();
-    } else {
-      device_->template load<BlockSolveProgram<kSphereRowKinds>>();
-      device_->template load<BlockSolveProgram<soft_step::kContactRowKinds>>();
-    }
+    visit_solver(
+        [this]<class Program>(const Program&, std::size_t) { device_->template load<Program>(); });
   }
 
   SubShapes& current_sub_shapes() { return sub_shapes_[sub_shapes_now_]; }
@@ -483,22 +507,7 @@ class DeviceStep final : public DeviceWorld {
     run(ShapeProgram{d}, contacts);
     run(MatchProgram{d}, contacts);
     mark(2);
-    run(PrepareProgram{d}, contacts);
-    const bool has_joints = d.world_joints.count > 0;
-    // More threads than rows: rows of manifolds need the caches of several multiprocessors.
-    const std::size_t rows = std::max<std::size_t>(contacts, 4 * std::size_t{last.manifolds});
-    if (d.step.bodies.has_blocks) {
-      if (has_joints) {
-        run(BlockSolveProgram<soft_step::kRowKinds>{d}, contacts);
-      } else {  // one of them returns at once
-        run(BlockSolveProgram<kSphereRowKinds>{d}, contacts);
-        run(BlockSolveProgram<soft_step::kContactRowKinds>{d}, contacts);
-      }
-    } else if (has_joints) {
-      run(SolveProgram<soft_step::kRowKinds>{d}, rows);
-    } else {
-      run(SolveProgram<soft_step::kContactRowKinds>{d}, rows);
-    }
+    visit_solver(run);
     run(CommitProgram{d}, contacts);
     mark(3);
   }

@@ -1,4 +1,4 @@
-/// Waking of bodies and assignment of rows in a soft step on a device.
+/// Waking of bodies, and the rows of a soft step on a device.
 #pragma once
 
 #include "src/base/atomic.hpp"
@@ -9,29 +9,81 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
 
-/// Wakes islands that touch an awake body, initializes the bodies, and assigns rows to contacts.
+/// The stages between the contacts and the sweeps.
+enum PrepareStage : unsigned {
+  kPrepareBodies = 1,   ///< wakes islands that touch an awake body, and initializes the bodies
+  kPlaceRows = 2,       ///< assigns rows to contacts and joints, except inner rows
+  kBuildInnerRows = 4,  ///< assigns and builds the inner rows
+  kBuildRows = 8,       ///< builds all other rows
+  /// All stages of a world of one block, which has no inner rows.
+  kPrepareOneBlock = kPrepareBodies | kPlaceRows | kBuildRows
+};
+
+/// Prepares the sweeps. In a world of one block, one program has all stages. In a world with
+/// blocks, each stage is a program, which needs fewer registers: more threads wait for memory at
+/// the same time.
+/// @tparam kStages sum of PrepareStage
+template <unsigned kStages>
 struct PrepareProgram {
+  static constexpr bool kHasBlocks = kStages != kPrepareOneBlock;
+  static constexpr bool has(PrepareStage stage) { return (kStages & stage) != 0; }
+
   /// The inner rows of a block, in memory that its threads share.
   struct BlockRows {
     /// By kind and color: number of rows, then the next row.
     std::uint32_t next[soft_step::kRowKinds][soft_step::kColorsPerClass];
     std::uint32_t points;  ///< of manifolds: their number, then the next one
     bool has_room[soft_step::kRowKinds];
-    soft_step::RowSetup::SphereProperties spheres[kBodiesPerBlock];  ///< by place in the block
+    // By place in the block.
+    soft_step::RowSetup::SphereProperties spheres[kBodiesPerBlock];
+    /// First contact of two spheres, and first manifold.
+    std::uint32_t first_sphere[kBodiesPerBlock], first_manifold[kBodiesPerBlock];
+    /// In the list of the contacts of all bodies: number of the first contact of a body, and the
+    /// end of its contacts of two spheres.
+    std::uint32_t begin[kBodiesPerBlock], end_of_spheres[kBodiesPerBlock];
+    std::uint32_t contacts;  ///< size of this list
   };
 
-  static constexpr unsigned kBlocksPerMultiprocessor = tuning::kPrepare;
-  static constexpr std::size_t kSharedBytes = sizeof(BlockRows);
+  static constexpr unsigned kBlocksPerMultiprocessor = kStages == kPlaceRows ? tuning::kPlaceStage
+                                                       : kStages == kBuildInnerRows
+                                                           ? tuning::kInnerStage
+                                                       : kHasBlocks ? tuning::kPrepareStage
+                                                                    : tuning::kPrepare;
+  static constexpr std::size_t kSharedBytes = has(kBuildInnerRows) ? sizeof(BlockRows)
+                                              : has(kPlaceRows)    ? kBytesOfBins
+                                                                   : 0;
   StepData data;
 
   template <class Team>
   JFPX_HD void operator()(const Team& team) const {
     if (data.has_failed()) return;
+    if constexpr (has(kPrepareBodies)) {
+      if (!prepare_bodies(team)) return;
+    }
+    if constexpr (has(kPlaceRows)) {
+      place_rows(team);
+      place_points(team);
+    }
+    if constexpr (has(kPlaceRows) && has(kBuildRows)) team.sync();
+    if constexpr (has(kBuildInnerRows)) place_inner_rows(team);
+    if constexpr (has(kBuildRows)) build_rows(team);
+  }
+
+ private:
+  /// @returns false if the step fails
+  template <class Team>
+  JFPX_HD bool prepare_bodies(const Team& team) const {
     const StepData& d = data;
     const BodyView& bodies = d.step.bodies;
     if (d.counters->any_asleep != 0) d.islands().wake_touched(team);
-    if (bodies.has_blocks) {
-      if (!has_indices(team)) return;
+    if constexpr (!kHasBlocks) {
+      team.for_each(bodies.count, [&](std::uint32_t i) {
+        const std::uint32_t body = bodies.ids[i].index;
+        d.step.load(body);
+        start(body, body);
+      });
+    } else {
+      if (!has_indices(team)) return false;
       const BlockCounts blocks = d.counters->blocks;
       const std::uint32_t first = blocks.first_without_place();
       team.for_each_nowait(blocks.without_place, [&](std::uint32_t i) {
@@ -41,33 +93,32 @@ struct PrepareProgram {
       team.for_each(
           bodies.count, [&](std::uint32_t i) { d.step.load(bodies.ids[i].index); },
           &d.divisions.bodies);
-      team.for_each(
+      team.for_each_nowait(
           blocks.indices(), [&](std::uint32_t i) { start(d.body_at[i], i); }, &d.divisions.places);
-    } else {
-      team.for_each(bodies.count, [&](std::uint32_t i) {
-        const std::uint32_t body = bodies.ids[i].index;
-        d.step.load(body);
-        start(body, body);
-      });
     }
-    place_rows(team);
-    place_points(team);
-    if (bodies.has_blocks) place_inner_rows(team);
-    team.sync();  // has_room() reads the numbers of rows of all blocks
+    return true;
+  }
+
+  /// Builds all rows except inner rows.
+  template <class Team>
+  JFPX_HD void build_rows(const Team& team) const {
+    const StepData& d = data;
     if (!has_room(team)) return;
     sort_overflow(team);
-    const auto sort_fixed_of = [&](std::uint32_t i) {
-      const std::uint32_t body = bodies.ids[i].index;
-      if (bodies.movable(body)) sort_fixed(d.index_of(body));
-    };
-    team.for_each_nowait(bodies.count, sort_fixed_of, &d.divisions.bodies);
+    if constexpr (kHasBlocks) {
+      team.for_each_nowait(
+          d.counters->blocks.indices(), [&](std::uint32_t i) { sort_fixed(i); },
+          &d.divisions.places);
+    } else {
+      const BodyView& bodies = d.step.bodies;
+      team.for_each_nowait(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
+    }
     const RowBins& rows = d.bins[team.part()];
     team.team_of_part().for_each_nowait(rows.begin[kBins] - rows.begin[0], [&](std::uint32_t i) {
       fill_row(rows, rows.begin[0] + i);
     });
   }
 
- private:
   /// Initializes a body for the first substep.
   /// @param i     the body, or kNone
   /// @param index its solver index
@@ -78,7 +129,7 @@ struct PrepareProgram {
     if (i == kNone || !bodies.is_active(i)) {
       d.row_bodies[index] = {};
       d.balls[index] = {};
-      if (bodies.has_blocks) BodyMotion(d.columns, index).start({}, {});
+      if constexpr (kHasBlocks) BodyMotion(d.columns, index).start({}, {});
       return;
     }
     soft_step::SolverBody body = d.step.solver[i];
@@ -90,7 +141,7 @@ struct PrepareProgram {
     d.orientation[index] = orientation;
     soft_step::FreeMotion free;
     d.step.accelerate(i, constants, orientation, &body, &free, true);
-    if (bodies.has_blocks) {
+    if constexpr (kHasBlocks) {
       BodyMotion(d.columns, index).start(body, free);
     } else {
       BodyCells(d.columns, index).start(body, free);
@@ -113,7 +164,7 @@ struct PrepareProgram {
           const std::uint32_t color = setup.color_of(i);
           const soft_step::RowKind kind = setup.kind_of(i);
           if (kind == soft_step::kNoRow) return RowPlace::kNone;
-          if (d.step.bodies.has_blocks && soft_step::is_inner_color(color)) {
+          if (kHasBlocks && soft_step::is_inner_color(color)) {
             if (setup.is_joint(i)) add_inner_joint(setup, i);
             return RowPlace::inner(kind, color);
           }
@@ -134,7 +185,7 @@ struct PrepareProgram {
           if (group == soft_step::kFixedGroup) {
             const std::uint32_t body = setup.movable_body(setup.key(i));
             prepend(&d.first_fixed[d.index_of(body)], d.next_fixed, row);
-          } else if (group > 0 && !d.step.bodies.has_blocks) {  // for Tickets
+          } else if (group > 0 && !kHasBlocks) {  // for Tickets
             const soft_step::ContactKey key = setup.key(i);
             const std::uint64_t bit = std::uint64_t{1} << (group - 1);
             atomic_or(&d.row_bodies[d.index_of(key.a)].colors, bit);
@@ -208,11 +259,24 @@ struct PrepareProgram {
         rows->next[i / soft_step::kColorsPerClass][i % soft_step::kColorsPerClass] = 0;
       });
       threads.once([&] { rows->points = 0; });
-      const Range places = blocks.indices_of(block);
-      threads.for_each(places.end - places.begin,
-                       [&](std::uint32_t i) { rows->spheres[i] = data.sphere(places.begin + i); });
+      const std::uint32_t first_place = block * kBodiesPerBlock;
+      threads.for_each(kBodiesPerBlock, [&](std::uint32_t i) {
+        const std::uint32_t body = data.body_at[first_place + i];
+        rows->spheres[i] = data.sphere(first_place + i);
+        const Range spheres = body == kNone ? Range() : data.now().spheres_of[body];
+        const Range manifolds = body == kNone ? Range() : data.now().manifolds_of[body];
+        rows->first_sphere[i] = spheres.begin;
+        rows->first_manifold[i] = manifolds.begin;
+        rows->end_of_spheres[i] = spheres.end - spheres.begin;
+        rows->begin[i] = rows->end_of_spheres[i] + (manifolds.end - manifolds.begin);
+      });
       threads.sync();
-      for_inner_contacts(threads, setup, block,
+      const std::uint32_t contacts = threads.scan(kBodiesPerBlock, rows->begin);
+      threads.for_each(kBodiesPerBlock,
+                       [&](std::uint32_t i) { rows->end_of_spheres[i] += rows->begin[i]; });
+      threads.once([&] { rows->contacts = contacts; });
+      threads.sync();
+      for_inner_contacts(threads, setup, block, *rows,
                          [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
                            atomic_add(&rows->next[kind][color], 1);
                            if (kind == kManifold) {
@@ -224,11 +288,17 @@ struct PrepareProgram {
         allocate_inner_rows(block, static_cast<soft_step::RowKind>(kind), rows);
       });
       threads.sync();
-      for_inner_contacts(threads, setup, block,
+      // Rows of spheres are built at once, in the order of their contacts. All other rows take
+      // longer, and are divided evenly among the threads.
+      for_inner_contacts(threads, setup, block, *rows,
                          [&](std::uint32_t i, soft_step::RowKind kind, std::uint32_t color) {
                            if (!rows->has_room[kind]) return;
                            const std::uint32_t row = atomic_add(&rows->next[kind][color], 1);
-                           contact_of_inner_row(kind, row) = i;
+                           if (kind == kSphere) {
+                             fill_inner<soft_step::SphereRow>(setup, rows, row, i);
+                           } else {
+                             contact_of_inner_row(kind, row) = i;
+                           }
                          });
       threads.sync();
       fill_inner_rows(threads, setup, block, rows, soft_step::RowTypes());
@@ -268,23 +338,24 @@ struct PrepareProgram {
   }
 
   /// Calls f(contact, kind, color) for the contacts and joints with inner rows in a block.
+  /// Consecutive threads have consecutive contacts, so that they read whole sectors.
   template <class Threads, class F>
   JFPX_HD void for_inner_contacts(const Threads& threads, const soft_step::RowSetup& setup,
-                                  std::uint32_t block, const F& f) const {
+                                  std::uint32_t block, const BlockRows& rows, const F& f) const {
     const StepData& d = data;
-    const Range places = d.counters->blocks.indices_of(block);
     const auto visit = [&](std::uint32_t i) {
       const RowPlace place{d.row_places[i]};
       if (place.is_inner()) f(i, place.kind(), place.color());
     };
-    threads.for_each(places.end - places.begin, [&](std::uint32_t k) {
-      const std::uint32_t body = d.body_at[places.begin + k];
-      if (body == kNone) return;
-      const Range spheres = d.now().spheres_of[body], manifolds = d.now().manifolds_of[body];
-      for (std::uint32_t i = spheres.begin; i < spheres.end; ++i) visit(i);
-      for (std::uint32_t i = manifolds.begin; i < manifolds.end; ++i) {
-        visit(setup.contacts.sphere_count + i);
+    threads.for_each(rows.contacts, [&](std::uint32_t k) {
+      std::uint32_t body = 0;  // the last one whose contacts begin at or before k
+      for (std::uint32_t step = kBodiesPerBlock / 2; step > 0; step /= 2) {
+        if (rows.begin[body + step] <= k) body += step;
       }
+      visit(k < rows.end_of_spheres[body]
+                ? rows.first_sphere[body] + (k - rows.begin[body])
+                : setup.contacts.sphere_count + rows.first_manifold[body] +
+                      (k - rows.end_of_spheres[body]));
     });
     if (d.world_joints.count == 0) return;
     threads.once([&] {
@@ -300,6 +371,7 @@ struct PrepareProgram {
     return data.inner_contacts[kind][row];
   }
 
+  /// Builds the inner rows of a block, except those of spheres.
   template <class Threads, class... Row>
   JFPX_HD void fill_inner_rows(const Threads& threads, const soft_step::RowSetup& setup,
                                std::uint32_t block, BlockRows* rows,
@@ -307,12 +379,14 @@ struct PrepareProgram {
     const auto fill = [&](auto type) {
       using RowType = typename decltype(type)::type;
       constexpr soft_step::RowKind kKind = soft_step::kKindOf<RowType>;
-      if (!rows->has_room[kKind]) return;
-      const std::uint32_t* begin = data.inner_begin(block, kKind);
-      const std::uint32_t first = begin[0], end = begin[soft_step::kColorsPerClass];
-      threads.for_each(end - first, [&](std::uint32_t i) {
-        fill_inner<RowType>(setup, rows, first + i, contact_of_inner_row(kKind, first + i));
-      });
+      if constexpr (kKind != kSphere) {
+        if (!rows->has_room[kKind]) return;
+        const std::uint32_t* begin = data.inner_begin(block, kKind);
+        const std::uint32_t first = begin[0], end = begin[soft_step::kColorsPerClass];
+        threads.for_each(end - first, [&](std::uint32_t i) {
+          fill_inner<RowType>(setup, rows, first + i, contact_of_inner_row(kKind, first + i));
+        });
+      }
     };
     (fill(std::type_identity<Row>()), ...);
   }
@@ -419,6 +493,7 @@ struct PrepareProgram {
   /// Sorts the rows between a movable body and fixed bodies. @param index solver index
   JFPX_HD void sort_fixed(std::uint32_t index) const {
     const StepData& d = data;
+    if (d.first_fixed[index] == kNone) return;
     const soft_step::RowSetup setup = d.row_setup();
     const auto order = [&](std::uint32_t row) { return setup.fixed_order(d.row_contact[row]); };
     d.first_fixed[index] =

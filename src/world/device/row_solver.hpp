@@ -3,6 +3,7 @@
 
 #include "src/base/atomic.hpp"
 #include "src/contact_solver/soft_step/row_operations.hpp"
+#include "src/world/device/impacts.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/sweep.hpp"
 
@@ -29,37 +30,8 @@ struct RowSolver {
 
   StepData data;
 
-  /// Accelerations of the bodies of rows.
-  struct Accelerations {
-    const StripedArray<soft_step::SubstepBody>& bodies;
-    std::uint32_t first;  ///< solver index of the body of index 0
-
-    JFPX_HD Vec3 operator[](std::uint32_t i) const { return bodies.load(first + i).acceleration; }
-  };
-
-  /// Change of the free motion of both bodies by the impact of a row; see soft_step::ImpactBodies.
-  struct Impact {
-    Accelerations acceleration;
-    std::uint32_t a = 0;  ///< body a of the row
-    mutable bool is_pending = false;
-    mutable soft_step::FreeMotion of_a = {}, of_b = {};
-
-    JFPX_HD void add(std::uint32_t body, const Vec3& change, const Vec3& spun) const {
-      is_pending = true;
-      (body == a ? of_a : of_b) = {change, spun};
-    }
-  };
-
-  /// The free motion of a body after the rows of a sweep.
-  struct BodyFree {
-    bool is_read = false, is_changed = false;
-    soft_step::FreeMotion motion;
-
-    JFPX_HD void read(const Cells& cells, const typename Cells::Version& version) {
-      if (!is_read) motion = cells.read_free(version);
-      is_read = true;
-    }
-  };
+  using Impact = typename ImpactOf<Cells>::Type;
+  using BodyFree = device::BodyFree<Cells>;
 
   /// A body of an item: the ticket for which the item waits, and the motion of the body at that
   /// ticket.
@@ -214,24 +186,20 @@ struct RowSolver {
     soft_step::SphereRow& row = item->sphere;
     const Real restitution = row.restitution;
     const Vec3 shift_a = item->a.motion.shift, shift_b = item->b.motion.shift;
-    const Impact impact{{data.substep_bodies, 0}, row.a};
+    const Impact impact({data.substep_bodies, 0}, data.columns, row.a);
     const soft_step::BodyPair pair{&item->a.motion, &item->b.motion, nullptr, nullptr};
     operation.template run<false>(
         &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
-    const auto write = [&](ItemBody* body, const Vec3& shift, const soft_step::FreeMotion& change) {
+    const auto write = [&](ItemBody* body, const Vec3& shift) {
       const Cells cells(data.columns, body->index);
       if constexpr (Operation::kMovesBodies) {
         if (!(body->motion.shift == shift)) cells.write_shift(body->motion, &body->version);
-        if (impact.is_pending) {
-          soft_step::FreeMotion free = cells.read_free(body->version);
-          free.add(change.velocity, change.angular_velocity);
-          cells.write_free(free, &body->version);
-        }
+        impact.write(body->index, cells, &body->version);
       }
       cells.write(body->after, body->motion, body->version);
     };
-    write(&item->a, shift_a, impact.of_a);
-    write(&item->b, shift_b, impact.of_b);
+    write(&item->a, shift_a);
+    write(&item->b, shift_b);
     if constexpr (Operation::kChangesRow) store_sphere_row(row, restitution, item->row);
   }
 
@@ -273,10 +241,10 @@ struct RowSolver {
   /// Ends a substep of a movable body.
   /// @param index solver index of the body
   /// @param moves number of moves in the step, with this one
-  JFPX_HD void move(std::uint32_t body, std::uint32_t index, std::uint32_t moves,
+  /// @param orientation before the move
+  JFPX_HD void move(std::uint32_t body, std::uint32_t index, std::uint32_t moves, Quat orientation,
                     SolverBody* motion) const {
     const StepData& d = data;
-    Quat orientation = d.orientation[index];
     bool has_joints = false;
     if constexpr (kKinds > soft_step::kContactRowKinds) {
       has_joints = d.substep_bodies.load(index).has(soft_step::SubstepBody::kHasJoints);
@@ -351,15 +319,11 @@ struct RowSolver {
     soft_step::SphereRow row = data.sphere_rows.load(r);
     const Real restitution = row.restitution;
     SolverBody fixed;  // not read: the body is constant
-    const Impact impact{{data.substep_bodies, 0}, row.a};
+    const Impact impact({data.substep_bodies, 0}, data.columns, row.a);
     const soft_step::BodyPair pair{&item->motion, &fixed, nullptr, nullptr};
     operation.template run<true>(
         &row, soft_step::RowContext<soft_step::NoPart, Impact>{pair, nullptr, &impact});
-    if (impact.is_pending) {
-      free->read(Cells(data.columns, item->index), item->version);
-      free->motion.add(impact.of_a.velocity, impact.of_a.angular_velocity);
-      free->is_changed = true;
-    }
+    impact.change(free, Cells(data.columns, item->index), item->version);
     if constexpr (Operation::kChangesRow) store_sphere_row(row, restitution, r);
   }
 

@@ -94,12 +94,13 @@ class ScratchBuffers {
                                    columns_of<soft_step::SphereRow>(ArrayIndex::equal, rows)),
                      rows};
     if (may_have_blocks_) {
+      constexpr soft_step::RowKind kFirst = soft_step::kKindOf<soft_step::SphereRow> + 1;
       std::size_t count = 0;
-      for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
+      for (soft_step::RowKind kind = kFirst; kind < soft_step::kRowKinds; ++kind) {
         count += d.parts * std::size_t{d.capacity_of(kind)};
       }
       std::uint32_t* next = transfer.room(&inner_contacts_, count, kEqual);
-      for (soft_step::RowKind kind = 0; kind < soft_step::kRowKinds; ++kind) {
+      for (soft_step::RowKind kind = kFirst; kind < soft_step::kRowKinds; ++kind) {
         d.inner_contacts[kind] = next;
         next += d.parts * std::size_t{d.capacity_of(kind)};
       }

@@ -145,7 +145,7 @@ struct SolveProgram : RowSolver<kKinds, BodyCells> {
       return;
     }
     if (sweep.stage == BodyStage::move) {
-      this->move(i, i, sweep.moves() + 1, &body);
+      this->move(i, i, sweep.moves() + 1, d.orientation[i], &body);
     }
     if (sweep.stage == BodyStage::accelerate) {
       free.read(cells, item->version);

@@ -78,6 +78,9 @@ struct RowBins {
   BlockCounts blocks;                         ///< Counters::blocks
 };
 
+/// Bytes of the shared memory of a block that partition() of a team needs.
+inline constexpr std::size_t kBytesOfBins = kMostParts * (kBins + 1) * sizeof(std::uint32_t);
+
 /// Capacities of lists whose size is known only on the device. A step that exceeds a capacity does
 /// not change the state of the world; the host reserves Counters::needed and repeats the step.
 struct Capacity {
@@ -268,7 +271,7 @@ struct StepData {
   std::uint64_t* manifold_sizes = nullptr;
 
   /// The movable bodies by place, with kNone in unused places, then the
-  /// bodies without a place, once PrepareProgram has put them there. If there are several
+  /// bodies without a place, once kPrepareBodies has put them there. If there are several
   /// parts, the blocks of places are in the order of `block_number`. The solver index of a body is
   /// its index in this array, so that the bodies of a block are neighbors in memory. In a world of
   /// one block, it is that of the body.
@@ -305,7 +308,8 @@ struct StepData {
   std::uint32_t* next_fixed = nullptr;   ///< by row of any kind
   /// By block, kind and color: the first inner row, as a number in its kind; see inner_begin().
   std::uint32_t* inner_rows = nullptr;
-  std::uint32_t* inner_contacts[soft_step::kRowKinds] = {};  ///< by kind and inner row
+  /// By kind and inner row; null for rows of spheres.
+  std::uint32_t* inner_contacts[soft_step::kRowKinds] = {};
   std::uint32_t* first_inner_joint = nullptr;  ///< by block: list of the joints of inner rows
   std::uint32_t* next_inner_joint = nullptr;   ///< by joint
   /// The overflow rows: by kind, then in the order of contacts.

@@ -19,15 +19,25 @@ template <class T>
 class StripedArray {
  public:
   static constexpr std::size_t kPieces = sizeof(T) / 16;
+  struct alignas(16) Piece {
+    std::uint32_t words[4];
+  };
+  struct Item {
+    Piece pieces[kPieces];
+  };
 
   StripedArray() = default;
   /// @param memory of `capacity` items, aligned to 16 bytes
   StripedArray(T* memory, std::size_t capacity)
       : pieces_(reinterpret_cast<Piece*>(memory)), capacity_(capacity) {}
 
+  /// Piece k of item i.
+  JFPX_HD const Piece* piece(std::size_t i, std::size_t k) const {
+    return &pieces_[k * capacity_ + i];
+  }
   JFPX_HD T load(std::size_t i) const {
     Item item;
-    for (std::size_t k = 0; k < kPieces; ++k) item.pieces[k] = pieces_[k * capacity_ + i];
+    for (std::size_t k = 0; k < kPieces; ++k) item.pieces[k] = *piece(i, k);
     return std::bit_cast<T>(item);
   }
   JFPX_HD void store(std::size_t i, const T& value) const { store_bytes<0, sizeof(T)>(i, value); }
@@ -44,12 +54,6 @@ class StripedArray {
 
  private:
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 16 == 0);
-  struct alignas(16) Piece {
-    std::uint32_t words[4];
-  };
-  struct Item {
-    Piece pieces[kPieces];
-  };
 
   Piece* pieces_ = nullptr;
   std::size_t capacity_ = 0;

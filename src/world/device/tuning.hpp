@@ -17,8 +17,9 @@ inline constexpr unsigned kClusterBlocks = 16;
 
 // Resident blocks per multiprocessor for which the programs are compiled.
 inline constexpr unsigned kForce = 2, kBounds = 3, kSphere = 6, kShape = 3, kMatch = 6,
-                          kPrepare = 3, kSolve = sizeof(Real) == 4 ? 2 : 1, kCommit = 3, kEdit = 3,
-                          kMerge = 3;
+                          kPrepare = 3, kPrepareStage = 4, kPlaceStage = 5,
+                          kInnerStage = sizeof(Real) == 4 ? 4 : 3,
+                          kSolve = sizeof(Real) == 4 ? 2 : 1, kCommit = 3, kEdit = 3, kMerge = 3;
 inline constexpr unsigned kMost = 6;  ///< the largest of these numbers
 
 }  // namespace tuning
