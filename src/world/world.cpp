@@ -343,19 +343,24 @@ namespace {
 /// @throws InvalidArgument
 void check_devices(const Scene& scene, const WorldSettings& settings) {
   if (settings.devices.empty()) return;
-  const std::string there_are = "there are " + std::to_string(settings.devices.size()) + " devices";
   if (settings.devices.size() > device::kMostParts) {
-    throw InvalidArgument(there_are + "; at most " + std::to_string(device::kMostParts) +
-                          " share a world");
+    throw InvalidArgument("devices has " + std::to_string(settings.devices.size()) +
+                          " numbers; at most " + std::to_string(device::kMostParts) +
+                          " devices share a world");
   }
+  std::string devices_are;
+  for (const int device : settings.devices) {
+    devices_are += (devices_are.empty() ? "devices is {" : ", ") + std::to_string(device);
+  }
+  devices_are += "}";
   if (settings.collider.backend == Backend::cpu) {
-    throw InvalidArgument(there_are + ", and the backend is cpu; it must be cuda or automatic");
+    throw InvalidArgument(devices_are + ", and the backend is cpu; it must be cuda or automatic");
   }
   if (scene.solver != Solver::soft_step) {
-    throw InvalidArgument(there_are + ", and the solver is worst_first; it must be soft_step");
+    throw InvalidArgument(devices_are + ", and the solver is worst_first; it must be soft_step");
   }
   if (settings.communicator != nullptr && settings.communicator->size() > 1) {
-    throw InvalidArgument(there_are + "; there must be none for a world of several ranks");
+    throw InvalidArgument(devices_are + "; it must be empty for a world of several ranks");
   }
 }
 

@@ -50,7 +50,7 @@ def test_a_world_on_the_host_has_no_device_states():
     ({"devices": "0,1"}, "devices is '0,1'; it must be a sequence"),
     ({"devices": [0, 0.5]}, r"devices\[1\] is 0.5; it must be an integer"),
     ({"devices": [-1]}, r"devices\[0\] is -1; it must be in"),
-    ({"devices": range(9)}, "there are 9 devices; at most 8 share a world"),
+    ({"devices": range(9)}, "devices has 9 numbers; at most 8 devices share a world"),
     ({"devices": [0, 1], "backend": "cpu"}, "the backend is cpu; it must be cuda or automatic"),
 ])
 def test_gpus_that_cannot_share_a_world_are_an_error(wrong, message):

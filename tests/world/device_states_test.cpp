@@ -14,7 +14,6 @@
 #include <cuda_runtime_api.h>
 #endif
 
-#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <ostream>

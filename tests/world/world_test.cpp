@@ -53,12 +53,13 @@ TEST(World, RefusesDevicesThatCannotShareIt) {
     }
   };
   refuse(Scene{}, {.collider = {.backend = Backend::cpu}, .devices = {0, 1}},
-         "there are 2 devices, and the backend is cpu; it must be cuda or automatic");
+         "devices is {0, 1}, and the backend is cpu; it must be cuda or automatic");
   Scene of_thesis;
   of_thesis.solver = Solver::worst_first;
   refuse(of_thesis, {.devices = {0}},
-         "there are 1 devices, and the solver is worst_first; it must be soft_step");
-  refuse(Scene{}, {.devices = std::vector<int>(9)}, "there are 9 devices; at most 8 share a world");
+         "devices is {0}, and the solver is worst_first; it must be soft_step");
+  refuse(Scene{}, {.devices = std::vector<int>(9)},
+         "devices has 9 numbers; at most 8 devices share a world");
 }
 
 TEST(World, StartsInTheStateOfTheScene) {
