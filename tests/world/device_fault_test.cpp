@@ -6,7 +6,6 @@
 #include "src/base/cuda/cuda_try.hpp"
 #include "src/scenes/scenes.hpp"
 #include "src/world/world_impl.hpp"
-#include "tests/support/seed.hpp"
 #include "tests/world/cuda_devices.hpp"
 #include "tests/world/several_blocks.hpp"
 
@@ -21,16 +20,9 @@ namespace {
 /// On one device, and on several parts of it.
 class CudaWorld : public testing::TestWithParam<test::CudaDevices> {
  protected:
-  static constexpr long kMostCalls = 10'000;  ///< more than any run makes
-  /// Difference of the numbers of the calls that fail. Several devices make thousands of calls.
-  static long stride() { return GetParam().devices.size() > 1 ? 5 : 1; }
-  /// The first of these numbers.
-  long first_call() const {
-    return static_cast<long>(unsigned{seed_} % static_cast<unsigned>(stride()));
-  }
+  static constexpr long kMostCalls = 10'000;  ///< more than a run makes
 
  private:
-  test::Seed seed_;
   test::SeveralBlocks several_blocks_{
       GetParam().devices.size() > 1 ? 8 : soft_step::kMostBodiesInOneBlock};
 };
@@ -78,8 +70,8 @@ TEST_P(CudaWorld, AnyFailingCallLeavesTheBitsOfTheProcessor) {
   World host(scene, {.collider = {.backend = Backend::cpu}});
   add_forces(&host);
   run(&host);
-  long failing = first_call();
-  for (bool was_reached = true; was_reached; failing += stride()) {
+  long failing = 0;
+  for (bool was_reached = true; was_reached; ++failing) {
     ASSERT_LT(failing, kMostCalls);
     World world(scene, {.collider = {.backend = Backend::cpu}});
     add_forces(&world);
@@ -118,8 +110,8 @@ TEST_P(CudaWorld, AnyFailingCallOfAQueueLeavesTheBitsOfTheProcessor) {
   World host(scene, {.collider = {.backend = Backend::cpu}});
   add_forces(&host);
   run(&host, false);
-  long failing = first_call();
-  for (bool was_reached = true; was_reached; failing += stride()) {
+  long failing = 0;
+  for (bool was_reached = true; was_reached; ++failing) {
     ASSERT_LT(failing, kMostCalls);
     World world(scene, {.collider = {.backend = Backend::cpu}});
     add_forces(&world);
