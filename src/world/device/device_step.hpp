@@ -302,14 +302,19 @@ class DeviceStep final : public DeviceWorld {
   template <class T>
   using Buffer = typename Device::template Buffer<T>;
 
+  /// Number of items of the programs over bodies and contacts.
+  std::size_t contact_items() const {
+    const ContactSizes& last = last_contacts().sizes();
+    return std::max({std::size_t{data_.step.bodies.count}, std::size_t{last.spheres},
+                     std::size_t{last.manifolds}});
+  }
+
   /// Calls f(program, items) for the programs between the contacts and the end of a step, which
   /// depend on the blocks and the joints of the world. @param items for Device::run()
   template <class F>
   void visit_solver(const F& f) const {
     const StepData& d = data_;
-    const ContactSizes& last = last_contacts().sizes();
-    const std::size_t bodies = d.step.bodies.count;
-    const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
+    const std::size_t contacts = contact_items();
     const bool has_joints = d.world_joints.count > 0;
     if (d.step.bodies.has_blocks) {
       f(PrepareProgram<kPrepareBodies>{d}, contacts);
@@ -326,7 +331,8 @@ class DeviceStep final : public DeviceWorld {
     }
     f(PrepareProgram<kPrepareOneBlock>{d}, contacts);
     // More threads than rows: rows of manifolds need the caches of several multiprocessors.
-    const std::size_t rows = std::max<std::size_t>(contacts, 4 * std::size_t{last.manifolds});
+    const std::size_t rows =
+        std::max<std::size_t>(contacts, 4 * std::size_t{last_contacts().sizes().manifolds});
     if (has_joints) {
       f(SolveProgram<soft_step::kRowKinds>{d}, rows);
     } else {
@@ -480,13 +486,12 @@ class DeviceStep final : public DeviceWorld {
   /// @param is_timed whether to mark the stages
   void run_programs(bool is_timed) {
     make_room();
-    const ContactSizes& last = last_contacts().sizes();
     data_.swept_bounds.bodies = data_.step.bodies;
     data_.orientation = scratch_.orientation_of_step(data_);
     const StepData& d = data_;
     const std::size_t bodies = d.step.bodies.count;
     const std::size_t sub_shapes = d.swept_bounds.sub_shapes.ranges.bounded();
-    const std::size_t contacts = std::max<std::size_t>({bodies, last.spheres, last.manifolds});
+    const std::size_t contacts = contact_items();
     const auto run = [&](const auto& program, std::size_t items) {
       device_->run(program, items, d.parts);
     };

@@ -85,7 +85,9 @@ class DirectImpact {
     stored.write_free(free);
     has_added_ = true;
   }
+  /// Nothing is left to write.
   JFPX_HD void write(std::uint32_t, const BodyMotion&, BodyMotion::Version*) const {}
+  /// Reads the free motion of body a again if it was read before the impact.
   JFPX_HD void change(BodyFree<BodyMotion>* free, const BodyMotion& stored,
                       const BodyMotion::Version& version) const {
     if (has_added_ && free->is_read) free->motion = stored.read_free(version);
