@@ -2,10 +2,11 @@
 Markdown. What is not installed is left out. All libraries search the same points, and must find the same
 number of pairs.
 
-    python bench/python/neighbours.py [cpu] [cells] [batches] [cuda] [stages] [world] [world-cuda]
+    python bench/python/neighbours.py [cpu] [cells] [batches] [cuda] [cuda-periodic] [stages] [world] [world-cuda]
 
 `cuda` compares with Warp, with PyTorch Geometric if --geometric is given, and with brute force, all on
-the device. `stages` divides the time of a call on the device.
+the device; `cuda-periodic` with open searches and nvalchemi-toolkit-ops. `stages` divides the time of a
+call on the device.
 """
 
 import argparse
@@ -276,7 +277,7 @@ def cuda(geometric):
           "| its count | both orders, int64 | periodic | radius_graph | its pairs | ratio | brute force | its pairs |\n"
           "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for n in (10_000, 100_000, 1_000_000):
-        for neighbours in (3, 30):
+        for neighbours in (3, 30, 100):
             host, cutoff = points_of(n, neighbours)
             x = torch.from_numpy(host).cuda()
             own = median_ms(lambda: jfpx.find_pairs(x, cutoff), wait, repeats=60)
@@ -306,6 +307,60 @@ def cuda(geometric):
           " us; with out and count "
           f"{1e3 * median_ms(lambda: collider.find_pairs(x, 0.1, out=out, count=count), wait, 2000):.1f}"
           " us")
+
+
+def nvalchemi_lists(x, cutoff, neighbours, cell):
+    """Functions of nvalchemi-toolkit-ops that list half of the neighbours with their shifts, each with a
+    prepared state, by the form of the result: rows of equal length, or pairs."""
+    import torch
+    from nvalchemiops.torch.neighbors import neighbor_list, prepare_neighbor_list
+
+    periodic = torch.ones(3, dtype=torch.bool, device="cuda")
+    lists = {}
+    for form, pairs in (("matrix", False), ("pairs", True)):
+        state = prepare_neighbor_list(x, cutoff, cell=cell, pbc=periodic, half_fill=True, return_neighbor_list=pairs,
+                                      max_neighbors=2 * neighbours + 32, fixed_cell=True)
+        lists[form] = lambda state=state: neighbor_list(x, cutoff, cell=cell, pbc=periodic, state=state)
+    return lists
+
+
+def periodic_on_device():
+    """Searches in a periodic cell with shifts; the libraries take turns."""
+    import torch
+
+    wait = torch.cuda.synchronize
+    print(f"\n## {torch.cuda.get_device_name()}, periodic cell, tensors of PyTorch, ms\n\nMedians; the searches take turns. "
+          "nvalchemi-toolkit-ops with a prepared state: `matrix` are rows of equal length, `pairs` a list as that of jfpx.\n\n"
+          "| points | neighbours | pairs | open | periodic | ratio | matrix | pairs | its pairs | matrix / jfpx | pairs / jfpx |\n"
+          "|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    for n in (10_000, 100_000, 1_000_000):
+        for neighbours in (3, 30, 100):
+            host, cutoff = points_of(n, neighbours)
+            x, cell = torch.from_numpy(host).cuda(), torch.eye(3, device="cuda")
+            searches = {"open": lambda: jfpx.find_pairs(x, cutoff),
+                        "periodic": lambda: jfpx.find_pairs(x, cutoff, periodic=(1, 1, 1))}
+            try:
+                searches.update(nvalchemi_lists(x, cutoff, neighbours, cell))
+            except ImportError:
+                pass
+            times = {name: [] for name in searches}
+            for i in range(5 + (60 if n * neighbours <= 3_000_000 else 15)):
+                for name, search in searches.items():
+                    wait()
+                    begin = time.perf_counter()
+                    search()
+                    wait()
+                    if i >= 5:
+                        times[name].append(1e3 * (time.perf_counter() - begin))
+            medians = {name: statistics.median(values) for name, values in times.items()}
+            pairs = searches["periodic"]()[0].shape[1]
+            cells = [n, neighbours, pairs, medians["open"], medians["periodic"],
+                     medians["periodic"] / medians["open"]]
+            if "pairs" in medians:
+                found = searches["pairs"]()
+                cells += [medians["matrix"], medians["pairs"], found[0].shape[1],
+                          medians["matrix"] / medians["periodic"], medians["pairs"] / medians["periodic"]]
+            row(*cells)
 
 
 def kernels_of(call, calls=20):
@@ -402,8 +457,8 @@ def world(backend="cpu"):
 
 
 def main():
-    parts = {"cpu": cpu, "cells": cells, "batches": batches, "cuda": None, "stages": stages, "world": world,
-             "world-cuda": lambda: world("cuda")}
+    parts = {"cpu": cpu, "cells": cells, "batches": batches, "cuda": None, "cuda-periodic": periodic_on_device,
+             "stages": stages, "world": world, "world-cuda": lambda: world("cuda")}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("parts", nargs="*", choices=[*parts, []], default=[], metavar="part")
     parser.add_argument("--geometric", action="store_true", help="also PyTorch Geometric")

@@ -397,12 +397,13 @@ class SphereCollider:
                 search.write_count(core, count)
                 return None
             if out is None and not contacts and search.finds_new_pairs(output, half):
-                return search.new_pairs(core, index)
-            size = search.run(core, contacts, bool(half))
-            if out is not None:
-                search.write(core, outputs, size)
-                return size
-            result = search.results(core, size, output, index, contacts)
+                result = search.new_pairs(core, index)
+            else:
+                size = search.run(core, contacts, bool(half))
+                if out is not None:
+                    search.write(core, outputs, size)
+                    return size
+                result = search.results(core, size, output, index, contacts)
         finally:
             self._lock.release()
         return _result(result, output, contacts, search.periodic)

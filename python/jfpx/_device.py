@@ -300,24 +300,32 @@ class DeviceSearch:
 
     def finds_new_pairs(self, output: str, half: bool) -> bool:
         """Whether the search is one for new_pairs()."""
-        return half and output == "coo" and not self.waits() and not self.periodic
+        return half and output == "coo" and not self.waits()
 
-    def new_pairs(self, core: Any, index: str) -> Any:
-        """Searches, and returns the pairs in a new array. A search writes to it directly, without a
-        wait for the number of pairs, if they are about as many as in the last search."""
-        expected = core.expected_pairs
+    def new_pairs(self, core: Any, index: str) -> list[Any]:
+        """Searches, and returns the pairs, and the shifts in a periodic cell, in new arrays. A search
+        writes to them directly, without a wait for the number of pairs, if they are about as many as
+        in the last search."""
+        address = self._functions.address
+        expected = core.expected_periodic_pairs if self.periodic else core.expected_pairs
         capacity = expected + expected // 8 + 64
         while True:
-            array = self._empty((2 * capacity,), index)
-            size = core.find_pairs(self._spheres, self._functions.address(array), index == "int64",
-                                   capacity, self.stream)
+            arrays = [self._empty((2 * capacity,), index)]
+            to = address(arrays[0]), index == "int64"
+            if self.periodic:
+                arrays.append(self._empty((3 * capacity,), "int32"))
+                size = core.find_periodic_pairs(self._spheres, self._cells, *to, address(arrays[1]),
+                                                capacity, self.stream)
+            else:
+                size = core.find_pairs(self._spheres, *to, capacity, self.stream)
             if size <= capacity:
                 break
             capacity = size
-        pairs = self._functions.head(array, (2, size))
+        results = [self._functions.head(array, shape)
+                   for array, shape in zip(arrays, ((2, size), (size, 3)))]
         if capacity > 2 * size + 4096:  # do not keep the unused memory
-            pairs = self._functions.copy(pairs)
-        return self.convert(pairs)
+            results = [self._functions.copy(result) for result in results]
+        return [self.convert(result) for result in results]
 
     def results(self, core: Any, size: int, output: str, index: str, contacts: bool) -> list[Any]:
         """New arrays with the result of run()."""

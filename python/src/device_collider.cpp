@@ -28,10 +28,11 @@ cuda::SphereArrays to_arrays(const ArraysTuple& t) {
           .radius_stride = std::get<5>(t),
           .radius = static_cast<Real>(std::get<6>(t))};
 }
-/// A collider, and the number of pairs that the next find_pairs() is likely to find.
+/// A collider, and the numbers of pairs that the next find_pairs() and find_periodic_pairs() are
+/// likely to find.
 struct DeviceCollider : cuda::ArrayCollider {
   using ArrayCollider::ArrayCollider;
-  std::uint64_t expected_pairs = 0;
+  std::uint64_t expected_pairs = 0, expected_periodic_pairs = 0;
 };
 cuda::ArrayResult to_result(bool contacts) {
   return contacts ? cuda::ArrayResult::contacts : cuda::ArrayResult::pairs;
@@ -44,6 +45,7 @@ void bind_device_collider(nb::module_& module) {
   nb::class_<DeviceCollider>(module, "DeviceCollider")
       .def("__init__", [](DeviceCollider* self, int device) { new (self) DeviceCollider(device); })
       .def_ro("expected_pairs", &DeviceCollider::expected_pairs)
+      .def_ro("expected_periodic_pairs", &DeviceCollider::expected_periodic_pairs)
       .def(
           "reserve",
           [](DeviceCollider& self, std::size_t spheres, std::size_t contacts) {
@@ -68,6 +70,20 @@ void bind_device_collider(nb::module_& module) {
                                        : self.find_pairs(arrays, pointer<std::int32_t>(indices),
                                                          capacity, to_stream(stream));
             return self.expected_pairs;
+          },
+          Release())
+      .def(
+          "find_periodic_pairs",
+          [](DeviceCollider& self, const ArraysTuple& spheres, const Rows<const double>& cell,
+             Address indices, bool wide, Address shifts, std::size_t capacity, Address stream) {
+            const auto find = [&](auto* to) {
+              return self.find_periodic_pairs(to_arrays(spheres), to_cells(cell).at(0), to,
+                                              pointer<std::int32_t>(shifts), capacity,
+                                              to_stream(stream));
+            };
+            self.expected_periodic_pairs =
+                wide ? find(pointer<std::int64_t>(indices)) : find(pointer<std::int32_t>(indices));
+            return self.expected_periodic_pairs;
           },
           Release())
       .def(

@@ -23,8 +23,9 @@ struct Reduced {
 Reduced reduce_all(std::span<const SphereInstance> spheres, const PeriodicCell& cell) {
   Reduced reduced{std::vector<SphereInstance>(spheres.size()),
                   std::vector<ImageShift>(spheres.size())};
+  const detail::CellErrors errors = detail::errors_in(cell);
   for_each_interruptible(spheres.size(), [&](std::size_t i) {
-    reduced.spheres[i] = detail::reduced(spheres[i], cell, &reduced.cells[i]);
+    reduced.spheres[i] = detail::reduced(spheres[i], cell, errors, &reduced.cells[i]);
   });
   return reduced;
 }

@@ -24,6 +24,9 @@ JFPX_HD inline ImageShift shift_of(std::uint32_t code) {
   return {c / 9 - 1, c / 3 % 3 - 1, c % 3 - 1};
 }
 
+/// Squares of shorter lengths underflow: 2^-73, in double 2^-536.
+inline constexpr auto kNegligible = static_cast<Real>(sizeof(Real) == 4 ? 0x1p-73 : 0x1p-536);
+
 /// Largest length of a cell: squares of distances in a few cells are finite.
 inline constexpr auto kLongestPeriod = static_cast<Real>(sizeof(Real) == 4 ? 0x1p60 : 0x1p508);
 JFPX_HD inline bool is_length(Real length) { return length > 0 && length <= kLongestPeriod; }
@@ -40,7 +43,7 @@ JFPX_HD inline bool fits(const PeriodicCell& cell, Real radius) {
 
 /// Up to this number of cells, the reduction is off by less than a length in either precision.
 JFPX_HD inline bool is_reducible(Real x, Real length) {
-  return absolute(x / length) < static_cast<Real>(1 << 20);
+  return absolute(x) < length || absolute(x / length) < static_cast<Real>(1 << 20);
 }
 JFPX_HD inline bool is_reducible(const Vec3& centre, const PeriodicCell& cell) {
   bool result = true;
@@ -77,6 +80,15 @@ JFPX_HD inline Real image_difference(Real a, Real b, std::int32_t shift, Real le
   return static_cast<Real>(exact_image_difference(a, b, shift, length));
 }
 
+/// x - shift * length, rounded once: on the device, where that is an instruction.
+JFPX_HD inline Real displaced(Real x, std::int32_t shift, Real length) {
+#if defined(__CUDA_ARCH__)
+  return ::fma(-static_cast<Real>(shift), length, x);
+#else
+  return image_difference(x, 0, shift, length);
+#endif
+}
+
 /// Reduces one coordinate to about [-length/2, length/2), and returns the number of cells that it
 /// was displaced by. A coordinate in this range does not change; another one is rounded once.
 JFPX_HD inline std::int32_t reduce(Real* x, Real length) {
@@ -88,44 +100,65 @@ JFPX_HD inline std::int32_t reduce(Real* x, Real length) {
   const Real cells = std::floor(given / length + Real(0.5));
 #endif
   auto count = static_cast<std::int32_t>(cells);
-  *x = image_difference(given, 0, count, length);
+  *x = displaced(given, count, length);
   // The quotient is rounded.
-  if (*x < -half) *x = image_difference(given, 0, --count, length);
-  if (*x >= half) *x = image_difference(given, 0, ++count, length);
+  if (*x < -half) *x = displaced(given, --count, length);
+  if (*x >= half) *x = displaced(given, ++count, length);
   return count;
 }
 
-/// A sphere in the cell whose radius covers the rounding of the reduction: if two spheres touch by
-/// touch_at(), their reduced spheres or images touch. A coordinate that is displaced has an error
-/// of less than epsilon length. The factor covers the roundings of both tests.
+/// Bounds of the errors of reduced centres and images in a cell.
+struct CellErrors {
+  Real distance;  ///< of the distance between a reduced centre and another one or its image
+  Real margin;    ///< of a radius: see reduced()
+};
+/// Proof, with u = epsilon/2. A coordinate that is displaced has an error of at most u L/2, and one
+/// of an image another one of 1.01 u L, as near_images() are less than 1.01 L away, unless the
+/// margin of another axis exceeds this length, which then has no part in the norm. So a difference
+/// of coordinates has an error of at most 2.1 u L along each axis.
+JFPX_HD inline CellErrors errors_in(const PeriodicCell& cell) {
+  Real squares = 0;
+  bool repeats = false;
+  for (int k = 0; k < 3; ++k) {
+    if (!cell.repeats[static_cast<std::size_t>(k)]) continue;
+    repeats = true;
+    squares += cell.lengths[k] * cell.lengths[k];
+  }
+  if (!repeats) return {0, 0};
+  const Real distance = square_root(squares) * (Real(1.1) * kEpsilon) + kNegligible;
+  return {distance, distance * Real(0.55) + kNegligible};
+}
+
+JFPX_HD inline Real reduced_radius(Real radius, const CellErrors& errors) {
+  return errors.margin > 0 ? (radius + errors.margin) * (1 + 8 * kEpsilon) : radius;
+}
+/// A sphere in the cell. Its radius is larger by a margin that is the same for all spheres, so that
+/// any two spheres that touch by touch_at() touch as reduced spheres or images, too. Proof: they
+/// have a true distance of at most s (1 + 6u) plus what underflows, where s is the sum of their
+/// radii, and the distance of the reduced ones exceeds it by at most `errors.distance`; the factor
+/// covers the roundings of both tests.
 /// @param cells receives the displacements along the axes that repeat
 /// @param sphere its centre is_reducible()
 JFPX_HD inline SphereInstance reduced(SphereInstance sphere, const PeriodicCell& cell,
-                                      ImageShift* cells) {
+                                      const CellErrors& errors, ImageShift* cells) {
   *cells = {};
-  Real error = 0;
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
-    if (!cell.repeats[axis]) continue;
-    (*cells)[axis] = reduce(&sphere.centre[k], cell.lengths[k]);
-    if ((*cells)[axis] != 0) error += cell.lengths[k] * kEpsilon;
+    if (cell.repeats[axis]) (*cells)[axis] = reduce(&sphere.centre[k], cell.lengths[k]);
   }
-  sphere.radius = (sphere.radius + error) * (1 + 16 * kEpsilon);
+  sphere.radius = reduced_radius(sphere.radius, errors);
   return sphere;
 }
 
 JFPX_HD inline Real image_coordinate(Real x, std::int32_t shift, Real length) {
   return shift == 0 ? x : x + static_cast<Real>(shift) * length;
 }
-/// An image of a reduced() sphere. Its radius also covers the rounding of the image.
+/// An image of a reduced() sphere.
 JFPX_HD inline SphereInstance image_of(SphereInstance sphere, const ImageShift& shift,
                                        const PeriodicCell& cell) {
   for (int k = 0; k < 3; ++k) {
-    const std::int32_t displacement = shift[static_cast<std::size_t>(k)];
-    if (displacement == 0) continue;
     Real& x = sphere.centre[k];
-    x = image_coordinate(x, displacement, cell.lengths[k]);
-    sphere.radius += cell.lengths[k] * (2 * kEpsilon);
+    x = image_coordinate(x, shift[static_cast<std::size_t>(k)], cell.lengths[k]);
   }
   return sphere;
 }
@@ -134,20 +167,19 @@ JFPX_HD inline SphereInstance image_of(SphereInstance sphere, const ImageShift& 
 /// wider by 8 epsilon lengths, which covers the roundings of the image and of the comparison.
 /// @param reach the largest sum of the radii of two reduced() spheres
 JFPX_HD inline std::uint32_t near_images(const Vec3& centre, const PeriodicCell& cell, Real reach) {
-  std::uint32_t codes = 1;
+  std::uint32_t near[3];  // bits 0 to 2: the shifts -1, 0 and 1
   for (int k = 0; k < 3; ++k) {
-    std::uint32_t near = 2;  // bits of the shifts -1, 0 and 1
-    if (cell.repeats[static_cast<std::size_t>(k)]) {
-      const Real length = cell.lengths[k];
-      const Real limit = length / 2 + reach + length * (8 * kEpsilon);
-      if (image_coordinate(centre[k], -1, length) >= -limit) near |= 1;
-      if (image_coordinate(centre[k], 1, length) <= limit) near |= 4;
-    }
-    // Each bit of the axes before becomes the three bits of this one.
-    std::uint32_t product = 0;
-    for (std::uint32_t bit = 0; bit < 9; ++bit) product |= (codes >> bit & 1u) * near << 3 * bit;
-    codes = product;
+    near[k] = 2;
+    if (!cell.repeats[static_cast<std::size_t>(k)]) continue;
+    const Real length = cell.lengths[k];
+    const Real limit = length / 2 + reach + length * (8 * kEpsilon);
+    if (image_coordinate(centre[k], -1, length) >= -limit) near[k] |= 1;
+    if (image_coordinate(centre[k], 1, length) <= limit) near[k] |= 4;
   }
+  // Each bit of y becomes the three bits of z, and each bit of x the nine of both.
+  const std::uint32_t every_third = (near[1] & 1) | (near[1] & 2) << 2 | (near[1] & 4) << 4;
+  const std::uint32_t every_ninth = (near[0] & 1) | (near[0] & 2) << 8 | (near[0] & 4) << 16;
+  const std::uint32_t codes = near[2] * every_third * every_ninth;
   return codes & ~(1u << kNoShift);
 }
 
@@ -163,6 +195,81 @@ JFPX_HD inline PairResult touch_at(const SphereInstance& a, const SphereInstance
     relative.centre[k] = image_difference(a.centre[k], b.centre[k], displacement, length);
   }
   return test_sphere_pair(relative, {{}, b.radius});
+}
+
+/// A pair of spheres that touches in a cell.
+struct ImageTouch {
+  PairResult pair;   ///< by touch_at()
+  ImageShift shift;  ///< of the given centres
+  ImageShift code;   ///< of the reduced centres: -1, 0 or 1 along each axis
+};
+
+/// Tests two spheres in a cell. If they touch through several images, the result is that with the
+/// lowest shift in lexicographic order.
+///
+/// An image is tested unless its distance along an axis exceeds `limit`. Proof, with u = epsilon/2:
+/// reduced centres are off by at most u L/2 each, and the two subtractions by 1.5 u L and 1.1 u L,
+/// so that the distance along an axis has an error of less than 4 u L. Spheres that touch have a
+/// true distance of at most s (1 + 6u) plus what underflows in squares (sphere_filter.hpp).
+JFPX_HD inline ImageTouch touch_in_cell(const SphereInstance& a, const SphereInstance& b,
+                                        const PeriodicCell& cell) {
+  const Real reach = (a.radius + b.radius) * (1 + 8 * kEpsilon) + kNegligible;
+  ImageShift between{};  // what the reduction displaced a by, minus the same of b
+  bool near[3][3];       // images with the shifts -1, 0 and 1 along each axis
+  for (int k = 0; k < 3; ++k) {
+    near[k][0] = near[k][2] = false;
+    near[k][1] = true;
+    const auto axis = static_cast<std::size_t>(k);
+    if (!cell.repeats[axis]) continue;
+    const Real length = cell.lengths[k], limit = reach + length * (4 * kEpsilon);
+    Real x = a.centre[k], y = b.centre[k];
+    between[axis] = reduce(&x, length);
+    between[axis] -= reduce(&y, length);
+    const Real difference = x - y;
+    near[k][0] = absolute(difference + length) <= limit;
+    near[k][1] = absolute(difference) <= limit;
+    near[k][2] = absolute(difference - length) <= limit;
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (!near[0][i]) continue;
+    for (int j = 0; j < 3; ++j) {
+      if (!near[1][j]) continue;
+      for (int k = 0; k < 3; ++k) {
+        if (!near[2][k]) continue;
+        ImageTouch result{{}, {}, {i - 1, j - 1, k - 1}};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          result.shift[axis] = between[axis] + result.code[axis];
+        }
+        result.pair = touch_at(a, b, result.shift, cell);
+        if (result.pair.touching != 0) return result;
+      }
+    }
+  }
+  return {};
+}
+
+/// Whether two spheres may touch through two images, which are half a length away on both sides.
+/// @param sum of their radii
+JFPX_HD inline bool may_touch_twice(Real sum, Real length) {
+  return !(sum + 2 * kNegligible < length * (Real(0.5) - 4 * kEpsilon));
+}
+/// The shift of touch_in_cell() for two spheres that touch. Unless the sum of the radii is half a
+/// length, the image that touches is the nearest one along each axis.
+JFPX_HD inline ImageShift shift_of_touching(const SphereInstance& a, const SphereInstance& b,
+                                            const PeriodicCell& cell) {
+  ImageShift result{};
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    if (!cell.repeats[axis]) continue;
+    const Real length = cell.lengths[k], half = length / 2;
+    if (may_touch_twice(a.radius + b.radius, length)) return touch_in_cell(a, b, cell).shift;
+    Real x = a.centre[k], y = b.centre[k];
+    result[axis] = reduce(&x, length);
+    result[axis] -= reduce(&y, length);
+    const Real difference = x - y;
+    result[axis] += difference > half ? 1 : difference < -half ? -1 : 0;
+  }
+  return result;
 }
 
 }  // namespace detail

@@ -3,6 +3,7 @@
 #include <jfpx/periodic.hpp>
 
 #include "src/collide/sphere_pair.hpp"
+#include "src/sphere_collider/periodic_cell.hpp"
 #include "tests/support/sphere_fixtures.hpp"
 
 #include <gmock/gmock.h>
@@ -259,6 +260,43 @@ TEST(Periodic, APairHalfALengthApartIsListedOnceWithTheLowerShift) {
   EXPECT_EQ(found[0].shift, (ImageShift{-1, 0, 0}));
   EXPECT_EQ(found[0].contact.distance, 0);
   EXPECT_EQ(found[0].contact.normal, (Vec3{1, 0, 0}));
+}
+
+/// The tests of pairs by which searches on the GPU decide, against the search on the CPU: pairs on
+/// a lattice of half lengths touch through two images, and large cells are inexact.
+TEST(Periodic, TestsOfPairsFindTheImagesOfTheSearch) {
+  Random random(base_seed());
+  const auto collider = make_sphere_collider();
+  for (const Real length : {Real(1), Real(8), Real(1e4), Real(1e7)}) {
+    const PeriodicCell cell{{length, length * Real(1.25), length * Real(0.9)},
+                            {true, random.below(2) == 0, true}};
+    Spheres spheres = gas_in(cell, 120, cell.lengths.z / 4, random);
+    for (std::size_t i = 0; i < 60; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        const auto halves = static_cast<Real>(random.below(9)) - 4;
+        spheres[i].centre[k] = halves / 2 * cell.lengths[k];
+      }
+      if (i < 30) spheres[i].radius = cell.lengths.z / 4;
+    }
+    std::map<std::pair<SphereIndex, SphereIndex>, PeriodicContact> expected;
+    for (const PeriodicContact& c : find_periodic_contacts(*collider, spheres, cell)) {
+      expected[{c.contact.a, c.contact.b}] = c;
+    }
+    for (SphereIndex a = 0; a < spheres.size(); ++a) {
+      for (SphereIndex b = a + 1; b < spheres.size(); ++b) {
+        const detail::ImageTouch touch = detail::touch_in_cell(spheres[a], spheres[b], cell);
+        const auto found = expected.find({a, b});
+        ASSERT_EQ(touch.pair.touching != 0, found != expected.end())
+            << a << ", " << b << ", " << length << ", " << seed_note();
+        if (found == expected.end()) continue;
+        const SphereContact& contact = found->second.contact;
+        EXPECT_EQ(touch.pair, (PairResult{contact.normal, contact.distance, 1}));
+        EXPECT_EQ(touch.shift, found->second.shift) << a << ", " << b << ", " << length;
+        EXPECT_EQ(detail::shift_of_touching(spheres[a], spheres[b], cell), touch.shift)
+            << a << ", " << b << ", " << length;
+      }
+    }
+  }
 }
 
 TEST(Periodic, InBothOrdersHasTheOppositeShifts) {

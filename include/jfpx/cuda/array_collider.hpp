@@ -75,6 +75,16 @@ class JFPX_API ArrayCollider {
   /// @throws InvalidArgument like that function; OutOfMemory, DeviceError
   std::uint64_t find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
                               ArrayResult result, bool both_orders, Stream stream);
+  /// Finds the pairs of find_periodic(), without both orders, and writes them like find_pairs(),
+  /// and the shifts of pair i to shifts[3 * i .. 3 * i + 3).
+  /// @param indices, shifts room for 2 * capacity and 3 * capacity elements, in device memory
+  /// @throws the exceptions of find_periodic()
+  std::uint64_t find_periodic_pairs(const SphereArrays& spheres, const PeriodicCell& cell,
+                                    std::int32_t* indices, std::int32_t* shifts,
+                                    std::size_t capacity, Stream stream);
+  std::uint64_t find_periodic_pairs(const SphereArrays& spheres, const PeriodicCell& cell,
+                                    std::int64_t* indices, std::int32_t* shifts,
+                                    std::size_t capacity, Stream stream);
   /// Finds the touching pairs within each of many periodic systems; see
   /// jfpx::find_periodic_contacts_in_systems(). Tests all pairs of each system.
   /// @param offsets, cells in host memory

@@ -13,6 +13,20 @@ namespace cuda {
 
 struct ArrayCollider::Impl : ArraySearch {
   using ArraySearch::ArraySearch;
+
+  /// @param own_cells none if the systems are not periodic
+  std::uint64_t find_in_systems(const SphereArrays& from, std::span<const std::uint64_t> ends,
+                                std::span<const PeriodicCell> own_cells, ArrayResult result,
+                                bool both_orders, Stream user) {
+    const DeviceGuard guard(device);
+    follow(user);
+    reserve_systems(from.count, ends);
+    pack(from);
+    return with_item(result, [&]<class Item>(std::type_identity<Item>) {
+      const std::uint64_t found = ArraySearch::find_in_systems<Item>(ends, own_cells);
+      return both_orders && found > 0 ? list_both_orders<Item>(found, user) : found;
+    });
+  }
 };
 
 ArrayCollider::ArrayCollider(int device, SphereAlgorithm algorithm)
@@ -81,31 +95,32 @@ std::uint64_t ArrayCollider::find_in_systems(const SphereArrays& spheres,
                                              std::span<const std::uint64_t> offsets,
                                              ArrayResult result, bool both_orders, Stream stream) {
   detail::check_offsets(offsets, spheres.count);
-  const DeviceGuard guard(impl_->device);
-  impl_->follow(stream);
-  impl_->reserve_systems(spheres.count, offsets);
-  impl_->pack(spheres);
-  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
-    DeviceBuffer<Item>& out = impl_->items<Item>().found;
-    ContactCount* const count = impl_->counts.data();
-    const std::uint64_t found = impl_->repeat_until_complete(
-        [&](bool) { impl_->search_systems(spheres.count, out, count); }, &out, count);
-    impl_->keep(found);
-    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  });
+  return impl_->find_in_systems(spheres, offsets, {}, result, both_orders, stream);
 }
 
 std::uint64_t ArrayCollider::find_periodic(const SphereArrays& spheres, const PeriodicCell& cell,
                                            ArrayResult result, bool both_orders, Stream stream) {
   const DeviceGuard guard(impl_->device);
-  impl_->follow(stream);
-  impl_->reserve(spheres.count, 0);
-  impl_->pack(spheres);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
-    const std::uint64_t found = impl_->search_periodic<Item>(spheres.count, cell);
-    impl_->keep(found);
+    const std::uint64_t found = impl_->find_periodic<Item>(spheres, nullptr, cell, stream);
     return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
   });
+}
+
+std::uint64_t ArrayCollider::find_periodic_pairs(const SphereArrays& spheres,
+                                                 const PeriodicCell& cell, std::int32_t* indices,
+                                                 std::int32_t* shifts, std::size_t capacity,
+                                                 Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  return impl_->find_periodic_pairs(spheres, cell, indices, shifts, capacity, stream);
+}
+
+std::uint64_t ArrayCollider::find_periodic_pairs(const SphereArrays& spheres,
+                                                 const PeriodicCell& cell, std::int64_t* indices,
+                                                 std::int32_t* shifts, std::size_t capacity,
+                                                 Stream stream) {
+  const DeviceGuard guard(impl_->device);
+  return impl_->find_periodic_pairs(spheres, cell, indices, shifts, capacity, stream);
 }
 
 std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& spheres,
@@ -115,15 +130,10 @@ std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& sphere
                                                       Stream stream) {
   detail::check_offsets(offsets, spheres.count);
   detail::check_number_of_cells(cells.size(), offsets);
-  const DeviceGuard guard(impl_->device);
-  impl_->follow(stream);
-  impl_->reserve_systems(spheres.count, offsets);
-  impl_->pack(spheres);
-  return with_item(result, [&]<class Item>(std::type_identity<Item>) {
-    const std::uint64_t found = impl_->search_periodic_systems<Item>(offsets, cells);
-    impl_->keep(found);
-    return both_orders && found > 0 ? impl_->list_both_orders<Item>(found, stream) : found;
-  });
+  const std::uint64_t found =
+      impl_->find_in_systems(spheres, offsets, cells, result, both_orders, stream);
+  impl_->is_periodic = true;  // also without systems
+  return found;
 }
 
 std::uint64_t ArrayCollider::find_periodic_between(const SphereArrays& first,
@@ -131,13 +141,11 @@ std::uint64_t ArrayCollider::find_periodic_between(const SphereArrays& first,
                                                    const PeriodicCell& cell, ArrayResult result,
                                                    Stream stream) {
   const DeviceGuard guard(impl_->device);
-  const std::size_t n = first.count + second.count;
-  impl_->follow(stream);
-  impl_->reserve(n, 0);
-  impl_->pack(first, &second);
   return with_item(result, [&]<class Item>(std::type_identity<Item>) {
-    const std::uint64_t found = impl_->search_periodic<Item>(n, cell);
-    return impl_->keep(found == 0 ? found : impl_->select_between<Item>(found, impl_->b_offset));
+    const std::uint64_t found = impl_->find_periodic<Item>(first, &second, cell, stream);
+    if (found == 0) return found;
+    impl_->follow(stream);
+    return impl_->keep(impl_->select_between<Item>(found, impl_->b_offset));
   });
 }
 
@@ -183,10 +191,7 @@ void ArrayCollider::write_shifts(std::int32_t* shifts, std::size_t capacity, Str
   }
   const DeviceGuard guard(impl_->device);
   with_item(impl_->kind, [&]<class Item>(std::type_identity<Item>) {
-    const FoundItems<Item> half{.items = impl_->items<Item>().found.data(),
-                                .n = impl_->count_of(0)};
-    launch_write_shifts(impl_->result<Item>(), half, impl_->periodic.shifts(), shifts, capacity,
-                        stream);
+    launch_write_shifts(impl_->in_cells, impl_->result<Item>(), shifts, capacity, stream);
   });
 }
 

@@ -91,42 +91,57 @@ ArraySearch::PolledCount ArraySearch::search_and_poll(const SphereInput& input, 
   collider.find(input, output, user);
   const unsigned long long word = signal.wait(user);
   if ((word & kSignalIsValid) == 0) {
+    if (input.periodic.is_one_launch) return {};
     JFPX_CUDA_TRY(cudaStreamSynchronize(user));
     if (input.spheres == nullptr) launch_pack(input.arrays, spheres.data(), user);
     reject(counts.data()->first_invalid, user);
   }
-  return {word >> kSignalBits, (word & kSignalIsComplete) != 0};
+  return {word >> kSignalBits, true, (word & kSignalIsComplete) != 0};
 }
 
+/// Searches until there is memory for all results. Returns their number, or none if a search with
+/// PeriodicInput::is_one_launch has refused the spheres.
 template <class Item>
-std::uint64_t ArraySearch::find(const SphereArrays& from, Stream user) {
-  const SphereInput input = prepare(from, user);
-  DeviceBuffer<Item>& out = items<Item>().found;
+std::optional<std::uint64_t> ArraySearch::search_to(const SphereInput& input,
+                                                    DeviceBuffer<Item>* out, Stream user) {
   while (true) {
-    const PolledCount found = search_and_poll(input, to_output(out, counts.data()), user);
-    if (found.is_complete) return keep(found.contacts);
-    follow(user);
-    out.reserve_geometric(pool, stream.get(), found.contacts, "contacts");
-    collider.reserve(from.count, out.capacity());
-    precede(user);
+    const PolledCount found = search_and_poll(input, to_output(*out, counts.data()), user);
+    if (!found.is_valid) return {};
+    if (found.is_complete) return found.contacts;
+    allocate_for(user, [&] {
+      out->reserve_geometric(pool, stream.get(), found.contacts, "contacts");
+      collider.reserve(input.n, out->capacity(), input.periodic.known != nullptr);
+    });
   }
 }
 
+/// The same for pairs in an array with room for `capacity`, which may be exceeded by the number.
 template <class Index>
-std::uint64_t ArraySearch::find_pairs(const SphereArrays& from, Index* to, std::size_t capacity,
-                                      Stream user) {
-  const SphereInput input = prepare(from, user);
+std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput& input, Index* to,
+                                                         std::size_t capacity, Stream user) {
   kind = ArrayResult::pairs;
   const SearchOutput output{.capacity = capacity,
                             .count = counts.data(),
                             .rows = {.indices = to, .is_wide = sizeof(Index) == 8}};
   while (true) {
     const PolledCount found = search_and_poll(input, output, user);
+    if (!found.is_valid) return {};
     if (found.is_complete || found.contacts > capacity) return found.contacts;
-    follow(user);
-    collider.reserve(from.count, found.contacts);
-    precede(user);
+    allocate_for(
+        user, [&] { collider.reserve(input.n, found.contacts, input.periodic.known != nullptr); });
   }
+}
+
+template <class Item>
+std::uint64_t ArraySearch::find(const SphereArrays& from, Stream user) {
+  const SphereInput input = prepare(from, user);
+  return keep(*search_to(input, &items<Item>().found, user));
+}
+
+template <class Index>
+std::uint64_t ArraySearch::find_pairs(const SphereArrays& from, Index* to, std::size_t capacity,
+                                      Stream user) {
+  return *search_to_rows(prepare(from, user), to, capacity, user);
 }
 
 template <class Item>
@@ -145,17 +160,22 @@ void ArraySearch::reject(std::uint32_t invalid, cudaStream_t after) {
   detail::reject_sphere(copy);
 }
 
-#define JFPX_INSTANTIATE(Item)                                                            \
-  template SearchOutput ArraySearch::to_output(const DeviceBuffer<Item>&, ContactCount*); \
-  template std::uint64_t ArraySearch::find<Item>(const SphereArrays&, Stream);            \
+#define JFPX_INSTANTIATE(Item)                                                               \
+  template SearchOutput ArraySearch::to_output(const DeviceBuffer<Item>&, ContactCount*);    \
+  template std::optional<std::uint64_t> ArraySearch::search_to(const SphereInput&,           \
+                                                               DeviceBuffer<Item>*, Stream); \
+  template std::uint64_t ArraySearch::find<Item>(const SphereArrays&, Stream);               \
   template void ArraySearch::search(std::size_t, const DeviceBuffer<Item>&, ContactCount*);
 JFPX_INSTANTIATE(SpherePair)
 JFPX_INSTANTIATE(SphereContact)
 #undef JFPX_INSTANTIATE
-template std::uint64_t ArraySearch::find_pairs(const SphereArrays&, std::int32_t*, std::size_t,
-                                               Stream);
-template std::uint64_t ArraySearch::find_pairs(const SphereArrays&, std::int64_t*, std::size_t,
-                                               Stream);
+#define JFPX_INSTANTIATE(Index)                                                                 \
+  template std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput&, Index*, \
+                                                                    std::size_t, Stream);       \
+  template std::uint64_t ArraySearch::find_pairs(const SphereArrays&, Index*, std::size_t, Stream);
+JFPX_INSTANTIATE(std::int32_t)
+JFPX_INSTANTIATE(std::int64_t)
+#undef JFPX_INSTANTIATE
 
 }  // namespace cuda
 }  // namespace JFPX_ABI

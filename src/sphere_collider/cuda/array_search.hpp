@@ -17,8 +17,7 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Results of one kind: as found, and as selected or in both orders. A search in a periodic cell
-/// begins with the pairs among spheres and images in `derived`.
+/// Results of one kind: as found, and as selected or in both orders.
 template <class Item>
 struct Items {
   DeviceBuffer<Item> found, derived;
@@ -63,53 +62,67 @@ struct ArraySearch {
   SphereInput prepare(const SphereArrays& from, Stream user);
   template <class Item>
   SearchOutput to_output(const DeviceBuffer<Item>& out, ContactCount* count);
-  /// Number of contacts of a search, and whether they fit into the output.
+  /// Number of contacts of a search, and whether they fit into the output. Not valid if a search
+  /// with PeriodicInput::is_one_launch has refused the spheres.
   struct PolledCount {
     std::uint64_t contacts;
-    bool is_complete;
+    bool is_valid, is_complete;
   };
   PolledCount search_and_poll(const SphereInput& input, SearchOutput output, Stream user);
   template <class Item>
   std::uint64_t find(const SphereArrays& from, Stream user);
+  template <class Item>
+  std::optional<std::uint64_t> search_to(const SphereInput& input, DeviceBuffer<Item>* out,
+                                         Stream user);
+  template <class Index>
+  std::optional<std::uint64_t> search_to_rows(const SphereInput& input, Index* to,
+                                              std::size_t capacity, Stream user);
   template <class Index>
   std::uint64_t find_pairs(const SphereArrays& from, Index* to, std::size_t capacity, Stream user);
   template <class Item>
   void search(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count);
   template <class Item>
-  void search_systems(std::size_t n, const DeviceBuffer<Item>& out, ContactCount* count,
-                      const unsigned long long* image_begins = nullptr);
-  /// Calls enqueue(again) until there is memory for all contacts. Returns their number.
-  template <class Item, class Search>
-  std::uint64_t repeat_until_complete(const Search& enqueue, DeviceBuffer<Item>* out,
-                                      const ContactCount* count) {
-    for (bool again = false;; again = true) {
-      enqueue(again);
+  void search_systems(std::size_t n, const DeviceBuffer<Item>& out);
+  /// Searches among n packed spheres until there is memory for all contacts. Returns their number.
+  template <class Item>
+  std::uint64_t search_and_wait(std::size_t n, DeviceBuffer<Item>* out, ContactCount* count) {
+    while (true) {
+      search(n, *out, count);
       wait();
       if (count->first_invalid != kNoSphere) reject(count->first_invalid, stream.get());
       if (count->complete != 0) return count->contacts;
       out->reserve_geometric(pool, stream.get(), count->contacts, "contacts");
+      collider.reserve(n, out->capacity());
     }
-  }
-  template <class Item>
-  std::uint64_t search_and_wait(std::size_t n, DeviceBuffer<Item>* out, ContactCount* count) {
-    const auto enqueue = [&](bool again) {
-      if (again) collider.reserve(n, out->capacity());
-      search(n, *out, count);
-    };
-    return repeat_until_complete(enqueue, out, count);
   }
   template <class Item>
   std::uint64_t search_and_wait(std::size_t n) {
     return search_and_wait(n, &items<Item>().found, counts.data());
   }
   template <class Item>
-  std::uint64_t search_periodic(std::size_t n, const PeriodicCell& cell);
+  std::uint64_t find_in_systems(std::span<const std::uint64_t> from,
+                                std::span<const PeriodicCell> own_cells = {});
+  void reserve_grid(std::size_t n, Stream user);
+  SphereInput prepare_periodic(const SphereArrays& first, const SphereArrays& second,
+                               const PeriodicCell& cell, Stream user);
+  bool has_all_images(const PeriodicCell& cell, Stream user);
+  template <class Search>
+  std::uint64_t search_in_cell(const SphereArrays& first, const SphereArrays* second,
+                               const PeriodicCell& cell, Stream user, const Search& search);
+  template <class Index>
+  std::uint64_t find_periodic_pairs(const SphereArrays& from, const PeriodicCell& cell, Index* to,
+                                    std::int32_t* shifts, std::size_t capacity, Stream user);
   template <class Item>
-  std::uint64_t search_periodic_systems(std::span<const std::uint64_t> from,
-                                        std::span<const PeriodicCell> cells);
-  template <class Item>
-  std::uint64_t keep_nearest(std::uint64_t found);
+  std::uint64_t find_periodic(const SphereArrays& first, const SphereArrays* second,
+                              const PeriodicCell& cell, Stream user);
   std::uint64_t count_of(int which) const { return counts.data()[which].contacts; }
+  /// Calls allocate() while the stream of the user waits.
+  template <class Allocate>
+  void allocate_for(Stream user, const Allocate& allocate) {
+    follow(user);
+    allocate();
+    precede(user);
+  }
   std::uint64_t keep(std::uint64_t found) { return number.emplace(found); }
   [[noreturn]] void reject(std::uint32_t invalid, cudaStream_t after);
   template <class Item>
@@ -146,11 +159,15 @@ struct ArraySearch {
   DeviceBuffer<unsigned long long> row_sums;
   DeviceBuffer<SearchState> state;
   DeviceBuffer<unsigned long long> indices;
+  DeviceBuffer<PeriodicCell> periodic_cells;
   PeriodicSearch periodic;
 
   // The last search.
   ArrayResult kind = ArrayResult::pairs;
   bool is_derived = false, is_periodic = false;
+  // Searches in a periodic cell until one launch is tried again, which an earlier one has refused.
+  unsigned searches_in_phases = 0;
+  SpheresInCells in_cells;
   std::optional<std::uint64_t> number = 0;  // of contacts, unless it is only on the device
   std::size_t rows = 0;
   std::uint32_t b_offset = 0;

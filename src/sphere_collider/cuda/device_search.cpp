@@ -67,22 +67,24 @@ bool DeviceSearch::is_one_launch(std::size_t n) const {
   return has_fused_ && n <= kFusedSpheres;
 }
 
-void DeviceSearch::reserve(std::size_t n, std::size_t contacts) {
+void DeviceSearch::reserve(std::size_t n, std::size_t contacts, bool needs_grid) {
   check_number_of_spheres(n);
   const DeviceGuard guard(device_);
   const std::size_t max_spheres = std::max(n, spheres_reserved_);
+  const bool with_grid = has_grid_ || needs_grid || uses_grid(max_spheres);
   // A search of all pairs needs no memory for contacts. A later reserve() of more spheres may
   // select the grid, which then needs memory for all contacts requested so far.
   contacts = std::max(contacts, contacts_requested_);
-  if (uses_grid(max_spheres)) {
+  if (with_grid) {
     const std::size_t bytes = grid_scratch_bytes(max_spheres, contacts);
     scratch_.reserve(pool_, stream_, bytes, "scratch memory");
   }
-  if (n > spheres_reserved_ || counters_.capacity() == 0) {
-    reserve_spheres(n);
-    spheres_reserved_ = n;
+  if (n > spheres_reserved_ || counters_.capacity() == 0 || with_grid != has_grid_) {
+    reserve_spheres(max_spheres, with_grid);
+    spheres_reserved_ = max_spheres;
+    has_grid_ = with_grid;
   }
-  if (uses_grid(spheres_reserved_) && contacts > contacts_reserved_) {
+  if (with_grid && contacts > contacts_reserved_) {
     overflow_.reserve(pool_, stream_, contacts, "pairs of long rows");
     long_rows_.reserve(pool_, stream_, contacts / kSlots + 1, "long rows");
     very_long_rows_.reserve(pool_, stream_, contacts / kMaxLongRow + 1, "very long rows");
@@ -92,8 +94,8 @@ void DeviceSearch::reserve(std::size_t n, std::size_t contacts) {
   contacts_requested_ = contacts;
 }
 
-void DeviceSearch::reserve_spheres(std::size_t n) {
-  const std::size_t table_size = uses_grid(n) ? table_size_for(n) : 0;
+void DeviceSearch::reserve_spheres(std::size_t n, bool with_grid) {
+  const std::size_t table_size = with_grid ? table_size_for(n) : 0;
   counters_.reserve(pool_, stream_, kStateWords + n + 4, "contact counts");
   offsets_.reserve(pool_, stream_, n + 1, "contact offsets");
   if (algorithm_ != SphereAlgorithm::grid) {
@@ -102,7 +104,7 @@ void DeviceSearch::reserve_spheres(std::size_t n) {
     masks_.reserve(pool_, stream_, mask_words(max_spheres), "pair masks");
     scan_scratch_.reserve(pool_, stream_, scan_scratch_bytes(max_spheres + 1), "scan scratch");
   }
-  if (uses_grid(n)) {
+  if (with_grid) {
     table_.reserve(pool_, stream_, table_size + 4, "cell table");
     block_sums_.reserve(pool_, stream_, limits_.max_blocks() + grid_sums(n, limits_) + n / kBin + 3,
                         "sums of blocks");
@@ -127,7 +129,8 @@ void DeviceSearch::find(const SphereInput& input, const SearchOutput& output, cu
   require_words(output.contacts, "contacts");
   require_words(output.pairs, "pairs");
   const DeviceGuard guard(device_);
-  if (uses_grid(input.n) && input.n > 0) {
+  const bool is_periodic = input.periodic.known != nullptr;
+  if ((uses_grid(input.n) || is_periodic) && input.n > 0) {
     find_in_grid(input, output, stream);
   } else if (has_fused_ && input.n <= kFusedSpheres) {
     launch_fused_search({input, output}, stream);

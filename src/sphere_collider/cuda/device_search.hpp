@@ -24,9 +24,12 @@ class DeviceSearch {
   DeviceSearch(cudaStream_t stream, int device, SphereAlgorithm algorithm);
 
   /// See DeviceSphereCollider::reserve().
-  void reserve(std::size_t n, std::size_t contacts);
+  /// @param needs_grid also for searches in a periodic cell, which always use the grid
+  void reserve(std::size_t n, std::size_t contacts, bool needs_grid = false);
   /// Whether memory is reserved for a search among n spheres.
-  bool fits(std::size_t n) const { return n <= spheres_reserved_; }
+  bool fits(std::size_t n, bool needs_grid = false) const {
+    return n <= spheres_reserved_ && (!needs_grid || has_grid_);
+  }
   /// @throws InvalidArgument unless fits(n)
   void require_reserved(std::size_t n) const;
   /// Whether a search among n spheres is one launch. Only such a search accepts an input of arrays.
@@ -34,13 +37,13 @@ class DeviceSearch {
   bool uses_grid(std::size_t n) const;
 
   /// Enqueues a search; see DeviceSphereCollider::find_contacts().
-  /// @pre fits(input.n)
+  /// @pre fits(), with the grid if the input is periodic
   void find(const SphereInput& input, const SearchOutput& output, cudaStream_t stream);
 
   int device() const { return device_; }
 
  private:
-  void reserve_spheres(std::size_t n);
+  void reserve_spheres(std::size_t n, bool with_grid);
   void find_among_all_pairs(const SphereInput& input, const SearchOutput& output,
                             cudaStream_t stream);
   void find_in_grid(const SphereInput& input, const SearchOutput& output, cudaStream_t stream);
@@ -52,6 +55,7 @@ class DeviceSearch {
   SphereAlgorithm algorithm_;
   MemoryPool pool_;
   bool has_fused_ = false;
+  bool has_grid_ = false;  // memory of the grid is reserved
   GridLimits limits_{};
   std::size_t spheres_reserved_ = 0, contacts_requested_ = 0, contacts_reserved_ = 0;
 

@@ -27,7 +27,7 @@ __global__ void __launch_bounds__(kGridThreads) measure_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ BuildStorage storage;
   clear(args.table.coarse->counts, sizeof(args.table.coarse->counts));
-  clear(args.rows.bin_sums, bins_of(args.input.n) * sizeof(*args.rows.bin_sums));
+  clear(args.rows.bin_sums, bins_of(args) * sizeof(*args.rows.bin_sums));
   measure(args, storage);
 }
 
@@ -57,13 +57,14 @@ __global__ void __launch_bounds__(kCountThreads) coarse_phase(GridArgs args) {
 }
 
 template <bool kLarge>
-__global__ void __launch_bounds__(TileStorage<kLarge>::kThreads, 1) partition_phase(GridArgs args) {
+__global__ void __launch_bounds__(TileStorage<kLarge>::kThreads, 1)
+    partition_phase(GridArgs args, unsigned size) {
   wait_for_previous_kernel();
   __shared__ GridPlan plan;
   __shared__ CountSumStorage<TileStorage<kLarge>::kThreads> sums;
   if (!is_valid_input(args)) return;
   copy_plan(args, plan);
-  partition(args, plan, *reinterpret_cast<TileStorage<kLarge>*>(dynamic_storage), sums);
+  partition(args, plan, size, *reinterpret_cast<TileStorage<kLarge>*>(dynamic_storage), sums);
 }
 
 template <unsigned kThreads>
@@ -77,35 +78,45 @@ __global__ void __launch_bounds__(kThreads, kThreads == 512 ? kSortBlocks : 1)
   sort_coarse<kThreads>(args, plan, capacity, sort_storage(dynamic_storage, capacity), sums);
 }
 
+template <bool kPeriodic>
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     single_level_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ SingleLevelStorage storage[kGridWarps];
   if (!is_valid_input(args) || !args.plan->single || args.plan->crowded) return;
-  SingleLevelSearcher(args, output, storage[threadIdx.x / 32])
+  SingleLevelSearcher<kPeriodic>(args, output, *args.plan, storage[threadIdx.x / 32])
       .run(blockIdx.x * kGridThreads + threadIdx.x);
 }
 
+template <bool kPeriodic>
 __global__ void __launch_bounds__(kGridThreads, kCrowdedBlocks)
     crowded_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ CrowdedStorage storage[kGridWarps];
   if (!is_valid_input(args) || !args.plan->crowded) return;
-  CrowdedSearcher searcher(args, output, *args.plan, storage[threadIdx.x / 32]);
+  CrowdedSearcher<kPeriodic> searcher(args, output, *args.plan, storage[threadIdx.x / 32]);
   const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x - lane_id();
   for (std::uint32_t k = 0; k < 32; k += kQueries) {
     if (position + k < args.input.n) searcher.run(position + k);
   }
 }
 
-template <bool kDense>
+template <bool kDense, bool kPeriodic>
 __global__ void __launch_bounds__(kGridThreads, kLevelBlocks<kDense>) search_phase(GridArgs args) {
   wait_for_previous_kernel();
   __shared__ SearchStorage<kDense> storage;
   __shared__ GridPlan plan;
   if (!is_valid_input(args) || args.plan->single || args.plan->dense != kDense) return;
   copy_plan(args, plan);
-  Searcher<kDense>(args, plan, storage).run();
+  Searcher<kDense, kPeriodic>(args, plan, storage).run();
+}
+
+__global__ void __launch_bounds__(kGridThreads)
+    row_again_phase(GridArgs args, SearchOutput output) {
+  wait_for_previous_kernel();
+  __shared__ RowStorage storage[kGridWarps];
+  if (!is_valid_input(args) || !args.plan->single) return;
+  stage_rows_again(args, output, *args.plan, storage[threadIdx.x / 32]);
 }
 
 __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchOutput output) {
@@ -142,11 +153,12 @@ __global__ void __launch_bounds__(kGridThreads) emit_phase(GridArgs args, Search
 __device__ bool has_long_rows(const GridArgs& args, const SearchOutput& output) {
   return args.state->overflow != 0 && is_valid_input(args) && is_complete(args, output);
 }
+template <bool kPeriodic>
 __global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   if (!has_long_rows(args, output)) return;
   if (args.plan->single) {
-    list_long_rows(args, *args.plan);
+    list_long_rows<kPeriodic>(args, *args.plan);
   } else {
     place_overflow(args);
   }
@@ -171,11 +183,16 @@ void launch_large(std::size_t max_bytes, std::size_t bytes, void (*kernel)(Param
   launch_sharing(bytes, kernel, blocks, 1, threads, stream, arguments...);
 }
 
+/// A multiprocessor runs one block at a time: all get the same number of tiles, of equal size.
 template <bool kLarge>
-void launch_partition(const GridArgs& args, std::size_t max_bytes, cudaStream_t stream) {
+void launch_partition(const GridArgs& args, std::size_t max_bytes, unsigned multiprocessors,
+                      cudaStream_t stream) {
   using Tile = TileStorage<kLarge>;
-  launch_large(max_bytes, sizeof(Tile), partition_phase<kLarge>,
-               (args.input.n - 1) / Tile::kSpheres + 1, Tile::kThreads, stream, args);
+  const unsigned fewest = (args.input.n - 1) / Tile::kSpheres + 1,
+                 most = (fewest - 1) / multiprocessors * multiprocessors + multiprocessors,
+                 size = fewest <= multiprocessors ? Tile::kSpheres : (args.input.n - 1) / most + 1;
+  launch_large(max_bytes, sizeof(Tile), partition_phase<kLarge>, (args.input.n - 1) / size + 1,
+               Tile::kThreads, stream, args, size);
 }
 
 void launch_sort(const GridArgs& args, const GridLimits& limits, cudaStream_t stream) {
@@ -183,9 +200,9 @@ void launch_sort(const GridArgs& args, const GridLimits& limits, cudaStream_t st
   const std::size_t max_bytes = limits.shared_bytes - kOthers;
   launch(coarse_phase, limits.multiprocessors, 1, kCountThreads, stream, args);
   if (sizeof(TileStorage<true>) <= max_bytes) {
-    launch_partition<true>(args, max_bytes, stream);
+    launch_partition<true>(args, max_bytes, limits.multiprocessors, stream);
   } else {
-    launch_partition<false>(args, max_bytes, stream);
+    launch_partition<false>(args, max_bytes, limits.multiprocessors, stream);
   }
   // If the spheres are distributed evenly, a coarse bucket has n / coarse_buckets to twice as many
   // spheres. If n / coarse_buckets spheres do not fit into shared memory, none are copied there,
@@ -212,6 +229,7 @@ void launch_sort(const GridArgs& args, const GridLimits& limits, cudaStream_t st
   }
 }
 
+template <bool kPeriodic>
 void launch_phases(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                    cudaStream_t stream) {
   const auto run = [&](auto kernel, unsigned blocks, const auto&... arguments) {
@@ -219,19 +237,24 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, const GridL
   };
   const unsigned multiprocessors = limits.multiprocessors, few_blocks = 4 * multiprocessors,
                  many_blocks = limits.max_blocks();
-  const auto chunks = static_cast<unsigned>((std::uint64_t{args.input.n} - 1) / kGridThreads + 1);
+  const auto chunks_of = [](std::uint32_t n) {
+    return static_cast<unsigned>((std::uint64_t{n} - 1) / kGridThreads + 1);
+  };
+  const unsigned chunks = chunks_of(args.input.n);
   JFPX_CUDA_TRY(cudaMemsetAsync(args.state, 0, sizeof(SearchState), stream));
   run(measure_phase, few_blocks, args);
   launch(plan_phase, kLastLevel + 1, 1, kPlanThreads, stream, args);
   launch_sort(args, limits, stream);
-  run(single_level_phase, chunks, args, output);
-  run(crowded_phase, chunks, args, output);
-  run(search_phase<true>, std::min(chunks, multiprocessors * kLevelBlocks<true>), args);
-  run(search_phase<false>, std::min(chunks, multiprocessors * kLevelBlocks<false>), args);
+  run(single_level_phase<kPeriodic>, chunks, args, output);
+  run(crowded_phase<kPeriodic>, chunks, args, output);
+  run(search_phase<true, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<true>), args);
+  run(search_phase<false, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<false>),
+      args);
+  if (kPeriodic) run(row_again_phase, 8 * multiprocessors, args, output);
   run(sum_phase, many_blocks, args, output);
-  run(copy_phase, chunks, args, output);
+  run(copy_phase, chunks_of(args.input.rows()), args, output);
   run(emit_phase, many_blocks, args, output);
-  run(list_phase, few_blocks, args, output);
+  run(list_phase<kPeriodic>, few_blocks, args, output);
   run(long_row_phase, 6 * multiprocessors, args, output);
 }
 
@@ -280,13 +303,18 @@ bool is_in_one_launch(std::size_t n) { return n <= kMaxInOneLaunch; }
 
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                         cudaStream_t stream) {
-  if (is_in_one_launch(args.input.n)) {
+  const bool is_periodic = args.input.periodic.known != nullptr;
+  if (is_periodic ? args.input.periodic.is_one_launch : is_in_one_launch(args.input.n)) {
     launch_in_one(args, output, limits.resident_blocks, stream);
   } else {
     GridArgs phased = args;
     phased.table.coarse_buckets =
         std::clamp(std::bit_ceil(args.input.n / kSpheresOfCoarse), kFewestCoarse, kCoarseBuckets);
-    launch_phases(phased, output, limits, stream);
+    if (is_periodic) {
+      launch_phases<true>(phased, output, limits, stream);
+    } else {
+      launch_phases<false>(phased, output, limits, stream);
+    }
   }
 }
 

@@ -5,6 +5,7 @@
 #include "src/sphere_collider/cuda/grid.hpp"
 #include "src/sphere_collider/cuda/grid_cells.hpp"
 #include "src/sphere_collider/cuda/local_filter.hpp"
+#include "src/sphere_collider/cuda/periodic_pairs.cuh"
 #include "src/sphere_collider/cuda/search.cuh"
 
 #include <cub/block/block_scan.cuh>
@@ -175,11 +176,13 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       plan.scale = scale;
       plan.dense = dense;
       plan.single = dense && scale.last_level == 0;
+      plan.equal_radii = state.largest_half == ~state.smallest_half;
+      // In a periodic cell, only pairs of equal spheres can be tested relative to a common origin.
+      const bool is_decidable = plan.equal_radii || args.input.periodic.known == nullptr;
       plan.crowded =
-          plan.single &&
+          plan.single && is_decidable &&
           x_cells * static_cast<Real>(args.input.n) > kCrowded * static_cast<Real>(all_cells) &&
           scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
-      plan.equal_radii = state.largest_half == ~state.smallest_half;
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table.size;
       plan.coarse_shift = 0;

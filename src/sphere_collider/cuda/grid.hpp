@@ -78,9 +78,10 @@ struct GridArgs {
     std::uint32_t size;        ///< largest number of buckets: a power of two
     std::uint32_t* starts;     ///< [size + 1] histogram, then first positions, of the buckets
     std::uint32_t* positions;  ///< [n] first the bucket, then the position, of a sphere
-    std::uint32_t* ranks;      ///< [n] first the rank in its bucket, then the length of its row
+    /// [n] first the rank in its bucket, then positions of rows_again, then the length of its row
+    std::uint32_t* ranks;
     SphereInstance* sorted;    ///< [n + kReadBeyond] spheres by position
-    std::uint32_t* ids;        ///< [n] their indices
+    std::uint32_t* ids;        ///< [n] their indices, or image_id()
     unsigned long long* sums;  ///< [blocks] spheres in the buckets of each block; direct: its pairs
     CoarseBuckets* coarse;
     std::uint32_t coarse_buckets = kCoarseBuckets;  ///< largest number of coarse buckets in use

@@ -231,7 +231,7 @@ __device__ inline void scatter(const GridArgs& args) {
       const std::uint64_t i = first + k * all_threads();
       if (i >= args.input.n) break;
       args.table.positions[i] = to[k];
-      args.table.ids[to[k]] = static_cast<std::uint32_t>(i);
+      args.table.ids[to[k]] = id_of(args.input, i);
       args.table.sorted[to[k]] = load_sphere(args.input, i);
     }
   }

@@ -39,6 +39,7 @@ struct CrowdedStorage {
 };
 
 /// Finds the neighbors b > a of each sphere a, and stages them like SingleLevelSearcher.
+template <bool kPeriodic>
 class CrowdedSearcher {
  public:
   __device__ CrowdedSearcher(const GridArgs& args, const SearchOutput& output, const GridPlan& plan,
@@ -49,11 +50,12 @@ class CrowdedSearcher {
   /// Call from all lanes of a warp.
   __device__ void run(std::uint32_t position) {
     const unsigned queries = min(kQueries, args_.input.n - position);
-    const bool is_query = query() < queries;
     const std::uint32_t at = position + min(query(), queries - 1);
     self_ = load_sorted(args_.table.sorted + at);
     id_ = args_.table.ids[at];
+    const bool is_query = query() < queries && !(kPeriodic && is_image(id_));
     found_ = 0;
+    is_doubtful_ = false;
     const SingleLevel level(plan_);
     const CellsOfAxis cells = cells_of_axis(level);
     const std::int32_t y = __shfl_sync(kFullWarp, cells.own, 1, kLanesOfQuery),
@@ -68,13 +70,19 @@ class CrowdedSearcher {
       search(level, is_in, first, united(cells.near, is_in));
       left &= ~__ballot_sync(kFullWarp, is_in);
     }
-    stage(position, queries);
+    stage(position, is_query);
   }
 
  private:
   __device__ static unsigned query() { return lane_id() / kLanesOfQuery; }
   /// Index of this lane among those of its query.
   __device__ static unsigned part() { return lane_id() % kLanesOfQuery; }
+  /// Whether the condition holds for a lane of the query of this lane.
+  __device__ static bool is_in_query(bool condition) {
+    constexpr unsigned kParts = (1u << kLanesOfQuery) - 1;
+    const unsigned lanes = __ballot_sync(kFullWarp, condition);
+    return (lanes >> (kLanesOfQuery * query()) & kParts) != 0;
+  }
   __device__ std::uint32_t& kept_id(unsigned k) { return s_.found[32 * k + lane_id()]; }
 
   /// The cell of a sphere, and the cells that can contain its neighbors, along one axis.
@@ -118,6 +126,9 @@ class CrowdedSearcher {
                       __shfl_sync(kFullWarp, self_.centre.y, first),
                       __shfl_sync(kFullWarp, self_.centre.z, first)};
     LocalQuery local = local_query(self_, level.half, origin);
+    if constexpr (kPeriodic) {
+      local.doubt = doubt_of<true>(args_.input.periodic, local.doubt, self_.radius + level.half);
+    }
     if (!is_in) local.limit = -std::numeric_limits<float>::infinity();
     const std::int32_t y = near.y.low + static_cast<std::int32_t>(lane_id() % kMaxRows),
                        z = near.z.low + static_cast<std::int32_t>(lane_id() / kMaxRows);
@@ -177,7 +188,7 @@ class CrowdedSearcher {
       const unsigned slot = 32 * k + lane_id();
       if (done + slot >= candidates) candidate.square = std::numeric_limits<float>::infinity();
       s_.candidates.spheres[slot] = candidate;
-      s_.candidates.ids[slot] = ids[k];
+      s_.candidates.ids[slot] = sphere_of<kPeriodic>(ids[k]);
     }
     return rows;
   }
@@ -198,7 +209,10 @@ class CrowdedSearcher {
       }
       tested += kTestsAtOnce;
     } while (kLanesOfQuery * tested < count);
-    if (plan_.equal_radii && __all_sync(kFullWarp, nearest > local.doubt)) {
+    if constexpr (kPeriodic) {  // all radii are equal
+      if (!(nearest > local.doubt)) is_doubtful_ = true;
+      keep_neighbors(touching, tested, [](std::uint32_t) { return true; });
+    } else if (plan_.equal_radii && __all_sync(kFullWarp, nearest > local.doubt)) {
       keep_neighbors(touching, tested, [](std::uint32_t) { return true; });
     } else {
       keep_neighbors(touching, tested,
@@ -220,7 +234,7 @@ class CrowdedSearcher {
   }
 
   /// Writes the neighbors of each query in order to the staging buffer.
-  __device__ void stage(std::uint32_t position, unsigned queries) {
+  __device__ void stage(std::uint32_t position, bool is_query) {
     std::uint32_t length = found_;  // of this and the lower lanes of the query
     for (unsigned d = 1; d < kLanesOfQuery; d *= 2) {
       const std::uint32_t below = __shfl_up_sync(kFullWarp, length, d, kLanesOfQuery);
@@ -228,10 +242,14 @@ class CrowdedSearcher {
     }
     const std::uint32_t before = length - found_;
     length = __shfl_sync(kFullWarp, length, kLanesOfQuery - 1, kLanesOfQuery);
-    const unsigned parts_of_query = ((1u << kLanesOfQuery) - 1) << (kLanesOfQuery * query());
-    const bool is_staged = length <= kMaxStaged,
-               is_kept = (__ballot_sync(kFullWarp, found_ > kMaxOfLane) & parts_of_query) == 0;
-    const bool is_query = query() < queries, is_last = part() == kLanesOfQuery - 1;
+    const bool is_staged = length <= kMaxStaged;
+    const bool is_kept = !is_in_query(found_ > kMaxOfLane);
+    if constexpr (kPeriodic) {
+      const bool is_again = is_in_query(is_doubtful_) || (is_staged && !is_kept);
+      if (is_query && is_again && part() == 0) list_row_again(args_, position + query());
+      is_query = is_query && !is_again;
+    }
+    const bool is_last = part() == kLanesOfQuery - 1;
     const std::uint32_t kept = is_query && is_staged ? length : 0;
     const std::uint32_t sum = warp_inclusive_sum(is_last ? kept : 0);
     const std::uint32_t start = is_last ? sum - kept : sum;  // of the row of the query
@@ -242,15 +260,7 @@ class CrowdedSearcher {
     }
     index = __shfl_sync(kFullWarp, index, 0);
     if (is_last && is_query) {
-      atomicAdd(&args_.rows.bin_sums[id_ / kBin], static_cast<unsigned long long>(length));
-      if (is_staged) {
-        args_.rows.offsets[id_] = staged_list(index + start, kept).bits;
-      } else {
-        args_.rows.offsets[id_] = staged_list(length, StagedList::kNotStaged).bits;
-        args_.table.positions[id_] = position + query();
-        atomicAdd(&args_.state->long_row_contacts, static_cast<unsigned long long>(length));
-        atomicAdd(&args_.state->overflow, 1ull);
-      }
+      record_row(args_, id_, position + query(), length, index + start);
     }
     if (index + all > args_.rows.capacity) return;
     std::uint32_t* const row = s_.rows + start;
@@ -258,20 +268,22 @@ class CrowdedSearcher {
       for (unsigned k = 0; k < found_; ++k) row[before + k] = kept_id(k);
     }
     // A lane has found more neighbors than it can keep: these queries are searched again.
-    for (unsigned left = __ballot_sync(kFullWarp, kept != 0 && !is_kept && part() == 0); left != 0;
-         left &= left - 1) {
-      const int first = __ffs(static_cast<int>(left)) - 1;
-      list_neighbors(args_, SingleLevel(plan_),
-                     position + static_cast<unsigned>(first) / kLanesOfQuery,
-                     s_.rows + __shfl_sync(kFullWarp, start, first));
+    if constexpr (!kPeriodic) {
+      for (unsigned left = __ballot_sync(kFullWarp, kept != 0 && !is_kept && part() == 0);
+           left != 0; left &= left - 1) {
+        const int first = __ffs(static_cast<int>(left)) - 1;
+        list_neighbors<false>(args_, SingleLevel(plan_),
+                              position + static_cast<unsigned>(first) / kLanesOfQuery,
+                              s_.rows + __shfl_sync(kFullWarp, start, first));
+      }
     }
     __syncwarp();
     sort_row(row, kept <= kMaxSorted ? kept : 0);
     for (unsigned left = __ballot_sync(kFullWarp, kept > kMaxSorted && part() == 0); left != 0;
          left &= left - 1) {
       const int first = __ffs(static_cast<int>(left)) - 1;
-      sort_long_row(s_.rows + __shfl_sync(kFullWarp, start, first),
-                    __shfl_sync(kFullWarp, kept, first));
+      sort_row_of_warp(s_.rows + __shfl_sync(kFullWarp, start, first),
+                       __shfl_sync(kFullWarp, kept, first));
     }
     if (staging_.contacts == nullptr) {
       for (std::uint32_t i = lane_id(); i < all; i += 32) {
@@ -334,28 +346,6 @@ class CrowdedSearcher {
     }
   }
 
-  /// A warp sorts a row of up to kMaxStaged neighbors by rank (number of smaller neighbors).
-  __device__ static void sort_long_row(std::uint32_t* row, std::uint32_t length) {
-    constexpr unsigned kOfLane = (kMaxStaged + 31) / 32;
-    std::uint32_t ids[kOfLane], ranks[kOfLane] = {};
-#pragma unroll
-    for (unsigned k = 0; k < kOfLane; ++k) {
-      const unsigned i = 32 * k + lane_id();
-      ids[k] = i < length ? row[i] : ~0u;
-    }
-    for (std::uint32_t i = 0; i < length; ++i) {
-      const std::uint32_t id = row[i];
-#pragma unroll
-      for (unsigned k = 0; k < kOfLane; ++k) ranks[k] += id < ids[k] ? 1 : 0;
-    }
-    __syncwarp();
-#pragma unroll
-    for (unsigned k = 0; k < kOfLane; ++k) {
-      if (32 * k + lane_id() < length) row[ranks[k]] = ids[k];
-    }
-    __syncwarp();
-  }
-
   /// Writes the contacts of the sorted row of the query from index `to` on.
   __device__ void write_contacts(unsigned long long to, const std::uint32_t* row,
                                  std::uint32_t length) {
@@ -368,9 +358,10 @@ class CrowdedSearcher {
   SearchOutput staging_;
   const GridPlan& plan_;
   CrowdedStorage& s_;
-  SphereInstance self_;      // of the query of this lane
-  std::uint32_t id_ = 0;     // its index
-  std::uint32_t found_ = 0;  // neighbors found by this lane
+  SphereInstance self_;       // of the query of this lane
+  std::uint32_t id_ = 0;      // its index
+  std::uint32_t found_ = 0;   // neighbors found by this lane
+  bool is_doubtful_ = false;  // in a periodic cell: a candidate of this lane needs an exact test
 };
 
 }  // namespace cuda

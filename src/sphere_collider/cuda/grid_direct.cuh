@@ -13,7 +13,8 @@ namespace cuda {
 inline constexpr unsigned kLanesOfSphere = 9;  // one per row of cells around a sphere
 inline constexpr unsigned kSpheresOfWarp = 32 / kLanesOfSphere;
 inline constexpr std::uint32_t kMinCellSlots = 6, kMaxCellSlots = 32;  // slots of a cell
-inline constexpr std::uint32_t kDirectPairs = 1024;  // largest number of pairs of a block
+inline constexpr std::uint32_t kDirectPairs = 1024;   // largest number of pairs of a block
+inline constexpr std::uint32_t kDirectDoubtful = 64;  // the same of pairs that need an exact test
 
 /// Grid of the cells between the lowest and the highest coordinates.
 struct DirectPlan {
@@ -26,7 +27,8 @@ struct DirectPlan {
 struct DirectStorage {
   alignas(8) unsigned char staged[kGridWarps][32 * sizeof(SphereContact)];
   BlockSums::TempStorage sums;
-  std::uint32_t found;
+  std::uint32_t found, doubtful;
+  std::uint32_t doubtful_rows[kDirectDoubtful], doubtful_slots[kDirectDoubtful];
   std::uint32_t counts[kGridThreads], starts[kGridThreads];  // row lengths and their exclusive sums
   std::uint32_t neighbors[kDirectPairs];                     // in the order of discovery
   std::uint32_t ranks[kDirectPairs];    // rank in the row, and (low 8 bits) the row in the block
@@ -76,20 +78,28 @@ __device__ inline void insert(const GridArgs& args, const DirectPlan& plan) {
     if (at < plan.cell_slots) {
       const std::size_t slot = std::size_t{cell} * plan.cell_slots + at;
       args.scratch.slots[slot] = sphere;
-      args.scratch.slot_ids[slot] = static_cast<std::uint32_t>(i);
+      args.scratch.slot_ids[slot] = id_of(args.input, i);
     } else {
       args.state->cell_is_full = 1;
     }
   }
 }
 
+__device__ inline void add_neighbor(unsigned local, std::uint32_t b, DirectStorage& s) {
+  const std::uint32_t rank = atomicAdd(&s.counts[local], 1u);
+  const std::uint32_t at = atomicAdd(&s.found, 1u);
+  if (at < kDirectPairs) s.neighbors[at] = b, s.ranks[at] = rank << 8 | local;
+}
+
 /// A lane tests its share of the rows of cells around sphere `a`, which has index `local` in the
 /// block, for neighbors b > a.
-__device__ inline void search_directly(const GridArgs& args, const DirectPlan& plan,
-                                       std::uint32_t a, unsigned local, unsigned lane,
-                                       DirectStorage& s) {
+template <bool kPeriodic>
+__device__ void search_directly(const GridArgs& args, const DirectPlan& plan, std::uint32_t a,
+                                unsigned local, unsigned lane, DirectStorage& s) {
   constexpr std::int32_t kCellsAtOnce = 3;
   constexpr unsigned kAtOnce = 4;
+  [[maybe_unused]] const Real doubt =
+      doubt_of<kPeriodic>(args.input.periodic, error_bound_of(2 * plan.half), 2 * plan.half);
   const SphereInstance self = load_sphere(args.input, a);
   const Real search_radius = search_radius_of(self.radius, plan.half);
   const auto low = [&](Real x, std::int32_t first) {
@@ -130,35 +140,58 @@ __device__ inline void search_directly(const GridArgs& args, const DirectPlan& p
 #pragma unroll
         for (unsigned k = 0; k < kAtOnce; ++k) {
           if (first + k >= ends[2] || !touch(self, others[k])) continue;
-          const std::uint32_t b = args.scratch.slot_ids[slot_of(first + k)];
+          const std::uint32_t b = sphere_of<kPeriodic>(args.scratch.slot_ids[slot_of(first + k)]);
           if (b <= a) continue;
-          const std::uint32_t rank = atomicAdd(&s.counts[local], 1u);
-          const std::uint32_t at = atomicAdd(&s.found, 1u);
-          if (at < kDirectPairs) s.neighbors[at] = b, s.ranks[at] = rank << 8 | local;
+          if (kPeriodic && !(excess(self, others[k]) < -doubt)) {
+            const std::uint32_t at = atomicAdd(&s.doubtful, 1u);
+            if (at >= kDirectDoubtful) continue;
+            s.doubtful_rows[at] = local;
+            s.doubtful_slots[at] = static_cast<std::uint32_t>(slot_of(first + k));
+          } else {
+            add_neighbor(local, b, s);
+          }
         }
       }
     }
   }
 }
 
+/// Tests the pairs that search_directly() could not decide from reduced spheres and images.
+/// @param first_a sphere of the first row of the block
+__device__ inline void test_doubtful(const GridArgs& args, std::uint32_t first_a,
+                                     DirectStorage& s) {
+  for (unsigned k = threadIdx.x; k < min(s.doubtful, kDirectDoubtful); k += kGridThreads) {
+    const std::uint32_t local = s.doubtful_rows[k], slot = s.doubtful_slots[k], a = first_a + local,
+                        b = sphere_of<true>(args.scratch.slot_ids[slot]);
+    if (touch_exactly<true>(args.input, a, load_sphere(args.input, a), b,
+                            load_sorted(args.scratch.slots + slot))) {
+      add_neighbor(local, b, s);
+    }
+  }
+  if (threadIdx.x == 0 && s.doubtful > kDirectDoubtful) args.state->block_is_full = 1;
+  __syncthreads();
+}
+
 /// Finds and sorts the pairs (a, b) of the spheres a of the block, and writes their number to
 /// Table::sums.
-__device__ inline void find_directly(const GridArgs& args, const DirectPlan& plan,
-                                     DirectStorage& s) {
+template <bool kPeriodic>
+__device__ void find_directly(const GridArgs& args, const DirectPlan& plan, DirectStorage& s) {
   __syncthreads();
   s.counts[threadIdx.x] = 0;
-  if (threadIdx.x == 0) s.found = 0;
+  if (threadIdx.x == 0) s.found = s.doubtful = 0;
   __syncthreads();
-  const Span span = span_of_block(args.input.n, 1);
+  const Span span = span_of_block(args.input.rows(), 1);
   const unsigned group = lane_id() / kLanesOfSphere;
   if (group < kSpheresOfWarp) {
     for (std::uint64_t a = span.first + threadIdx.x / 32 * kSpheresOfWarp + group; a < span.past;
          a += kGridWarps * kSpheresOfWarp) {
-      search_directly(args, plan, static_cast<std::uint32_t>(a),
-                      static_cast<unsigned>(a - span.first), lane_id() % kLanesOfSphere, s);
+      search_directly<kPeriodic>(args, plan, static_cast<std::uint32_t>(a),
+                                 static_cast<unsigned>(a - span.first), lane_id() % kLanesOfSphere,
+                                 s);
     }
   }
   __syncthreads();
+  if constexpr (kPeriodic) test_doubtful(args, static_cast<std::uint32_t>(span.first), s);
   unsigned long long total = 0;
   s.starts[threadIdx.x] =
       static_cast<std::uint32_t>(block_exclusive_sum(s.counts[threadIdx.x], s.sums, total));
@@ -202,7 +235,7 @@ __device__ inline void emit_directly(const GridArgs& args, const SearchOutput& o
   SearchOutput known = output;
   known.rows.length = all;
   const auto total = static_cast<std::uint32_t>(args.table.sums[blockIdx.x]);
-  const auto first_a = static_cast<std::uint32_t>(span_of_block(args.input.n, 1).first);
+  const auto first_a = static_cast<std::uint32_t>(span_of_block(args.input.rows(), 1).first);
   for (std::uint32_t first = threadIdx.x & ~31u; first < total; first += kGridThreads) {
     const std::uint32_t c = first + lane_id();
     if (c < total) {

@@ -129,7 +129,7 @@ __device__ inline void write_staged(unsigned char* staged, unsigned count, Spher
 
 /// Stores the row lengths by index instead of by position, and sums those of each block.
 __device__ inline void sum_counts(const GridArgs& args, EmitStorage& s) {
-  const Span span = span_of_block(args.input.n, 1);
+  const Span span = span_of_block(args.input.rows(), 1);
   unsigned long long sum = 0;
   for (std::uint64_t a = span.first + threadIdx.x; a < span.past; a += kGridThreads) {
     const std::uint32_t count = args.rows.counts[args.table.positions[a]];
@@ -189,7 +189,7 @@ __device__ inline unsigned long long emit_tile(const GridArgs& args, const Searc
 }
 
 __device__ inline void emit(const GridArgs& args, const SearchOutput& output, EmitStorage& s) {
-  const Span span = span_of_block(args.input.n, 1);
+  const Span span = span_of_block(args.input.rows(), 1);
   unsigned long long before = sum_of_blocks_before(args.rows.sums, s.sums);
   for (std::uint64_t a = span.first; a < span.past; a += kGridThreads) {
     before += emit_tile(args, output, a, span.past, before, s);

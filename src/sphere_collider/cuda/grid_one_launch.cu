@@ -25,6 +25,8 @@ union PhaseStorage {
   EmitStorage emit;
   LongRowStorage long_rows;
   CrowdedStorage crowded[kGridWarps];
+  SingleLevelStorage single[kGridWarps];
+  RowStorage rows[kGridWarps];
   CopyStorage copy;
 };
 
@@ -39,6 +41,7 @@ __device__ void clear_next_state(AlternatingStates& states) {
 
 /// Performs the direct search, if it applies.
 /// @return whether it has written the result.
+template <bool kPeriodic>
 __device__ bool search_without_sorting(const GridArgs& args, const SearchOutput& output,
                                        DirectStorage& storage, const cg::grid_group& grid) {
   const DirectPlan plan = make_direct_plan(args);
@@ -46,7 +49,7 @@ __device__ bool search_without_sorting(const GridArgs& args, const SearchOutput&
   insert(args, plan);
   grid.sync();
   if (args.state->cell_is_full == 0) {
-    find_directly(args, plan, storage);
+    find_directly<kPeriodic>(args, plan, storage);
     grid.sync();
     if (args.state->block_is_full == 0) {
       emit_directly(args, output, storage);
@@ -58,18 +61,31 @@ __device__ bool search_without_sorting(const GridArgs& args, const SearchOutput&
   return false;
 }
 
-/// The phases after the sort, for crowded spheres.
-__device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
-                               const GridPlan& plan, PhaseStorage& storage,
-                               const cg::grid_group& grid) {
+/// The phases after the sort, for searches that stage rows.
+template <bool kPeriodic>
+__device__ void search_and_copy(const GridArgs& args, const SearchOutput& output,
+                                const GridPlan& plan, PhaseStorage& storage,
+                                const cg::grid_group& grid) {
   const unsigned warp = threadIdx.x / 32;
-  CrowdedSearcher searcher(args, output, plan, storage.crowded[warp]);
-  const std::uint64_t stride = std::uint64_t{kQueries} * kGridWarps * gridDim.x;
-  for (std::uint64_t first = std::uint64_t{kQueries} * (kGridWarps * blockIdx.x + warp);
-       first < args.input.n; first += stride) {
-    searcher.run(static_cast<std::uint32_t>(first));
+  const std::uint64_t warps = std::uint64_t{kGridWarps} * gridDim.x,
+                      first_warp = kGridWarps * blockIdx.x + warp;
+  if (plan.crowded) {
+    CrowdedSearcher<kPeriodic> searcher(args, output, plan, storage.crowded[warp]);
+    for (std::uint64_t first = kQueries * first_warp; first < args.input.n;
+         first += kQueries * warps) {
+      searcher.run(static_cast<std::uint32_t>(first));
+    }
+  } else if constexpr (kPeriodic) {
+    for (std::uint64_t first = 32 * first_warp; first < args.input.n; first += 32 * warps) {
+      SingleLevelSearcher<true>(args, output, plan, storage.single[warp])
+          .run(static_cast<std::uint32_t>(first) + lane_id());
+    }
   }
   grid.sync();
+  if constexpr (kPeriodic) {
+    stage_rows_again(args, output, plan, storage.rows[warp]);
+    grid.sync();
+  }
   const bool complete = is_complete(args, output);
   if (blockIdx.x == 0 && threadIdx.x == 0) {
     write_count(output, contacts_found(*args.state), kNoSphere, complete);
@@ -79,57 +95,25 @@ __device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
   copy_bins(args, known, storage.copy);
   if (args.state->overflow == 0) return;
   grid.sync();
-  list_long_rows(args, plan);
+  list_long_rows<kPeriodic>(args, plan);
   grid.sync();
   emit_long_rows(args, known, storage.long_rows);
 }
 
-__global__ void __launch_bounds__(kGridThreads, kOneLaunchBlocks)
-    grid_search(const __grid_constant__ GridArgs arguments,
-                const __grid_constant__ SearchOutput output) {
-  __shared__ PhaseStorage storage;
-  __shared__ GridPlan plan;
-  const cg::grid_group grid = cg::this_grid();
-  const bool one = blockIdx.x == 0 && threadIdx.x == 0;
-  GridArgs args = arguments;
-  args.state = current_state(*args.states);
-
-  clear_table(args);
-  clear_counts(args);
-  clear(args.rows.bin_sums, bins_of(args.input.n) * sizeof(*args.rows.bin_sums));
-  measure(args, storage.build);
-  grid.sync();
-  if (one) clear_next_state(*args.states);
-  if (args.state->valid_before != 0) {
-    if (one) write_count(output, 0, first_invalid(args.state), false);
-    return;
-  }
-  if (needs_sample(*args.state)) {
-    sample_cells(args, storage.build);
-    grid.sync();
-  }
-  if (search_without_sorting(args, output, storage.direct, grid)) return;
-  make_plan(args, plan);
-  assign(args, plan);
-  grid.sync();
-  sum_table(args, plan, storage.build);
-  grid.sync();
-  scan_table(args, plan, storage.build);
-  grid.sync();
-  scatter(args);
-  grid.sync();
-  if (plan.crowded) {
-    search_crowded(args, output, plan, storage, grid);
-    return;
-  }
+/// The phases after the sort, for searches that count the pairs of each sphere.
+__device__ void search_and_emit(const GridArgs& args, const SearchOutput& output,
+                                const GridPlan& plan, PhaseStorage& storage,
+                                const cg::grid_group& grid) {
   if (plan.dense) {
-    Searcher<true>(args, plan, storage.dense_search).run();
+    Searcher<true, false>(args, plan, storage.dense_search).run();
   } else {
-    Searcher<false>(args, plan, storage.search).run();
+    Searcher<false, false>(args, plan, storage.search).run();
   }
   grid.sync();
   const bool complete = is_complete(args, output);
-  if (one) write_count(output, args.state->contacts, kNoSphere, complete);
+  if (blockIdx.x == 0 && threadIdx.x == 0) {
+    write_count(output, args.state->contacts, kNoSphere, complete);
+  }
   if (!complete) return;
   const SearchOutput known = with_row_length(args, output);
   sum_counts(args, storage.emit);
@@ -142,13 +126,68 @@ __global__ void __launch_bounds__(kGridThreads, kOneLaunchBlocks)
   emit_long_rows(args, known, storage.long_rows);
 }
 
+template <bool kPeriodic>
+__global__ void __launch_bounds__(kGridThreads, kOneLaunchBlocks)
+    grid_search(const __grid_constant__ GridArgs arguments,
+                const __grid_constant__ SearchOutput output) {
+  __shared__ PhaseStorage storage;
+  __shared__ GridPlan plan;
+  const cg::grid_group grid = cg::this_grid();
+  const bool one = blockIdx.x == 0 && threadIdx.x == 0;
+  GridArgs args = arguments;
+  if (kPeriodic && args.input.periodic.is_one_launch) args.input.n = args.input.periodic.known->n;
+  if (kPeriodic && args.input.n == 0) {
+    if (one) write_count(output, 0, 0, false);
+    return;
+  }
+  args.state = current_state(*args.states);
+
+  clear_table(args);
+  clear_counts(args);
+  clear(args.rows.bin_sums, bins_of(args) * sizeof(*args.rows.bin_sums));
+  measure(args, storage.build);
+  grid.sync();
+  if (one) clear_next_state(*args.states);
+  if (args.state->valid_before != 0) {
+    if (one) write_count(output, 0, first_invalid(args.state), false);
+    return;
+  }
+  if (needs_sample(*args.state)) {
+    sample_cells(args, storage.build);
+    grid.sync();
+  }
+  if (search_without_sorting<kPeriodic>(args, output, storage.direct, grid)) return;
+  make_plan(args, plan);
+  if (kPeriodic && !plan.single) {  // see PeriodicInput::is_one_launch
+    if (one) write_count(output, 0, 0, false);
+    return;
+  }
+  assign(args, plan);
+  grid.sync();
+  sum_table(args, plan, storage.build);
+  grid.sync();
+  scan_table(args, plan, storage.build);
+  grid.sync();
+  scatter(args);
+  grid.sync();
+  if (kPeriodic || plan.crowded) {
+    search_and_copy<kPeriodic>(args, output, plan, storage, grid);
+  } else {
+    search_and_emit(args, output, plan, storage, grid);
+  }
+}
+using Kernel = void(GridArgs, SearchOutput);
+
 }  // namespace
 
 unsigned resident_grid_blocks(unsigned multiprocessors) {
-  int per_multiprocessor = 0;
-  JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&per_multiprocessor, grid_search,
-                                                              kGridThreads, 0));
-  return static_cast<unsigned>(per_multiprocessor) * multiprocessors;
+  const auto per_multiprocessor = [](Kernel* kernel) {
+    int blocks = 0;
+    JFPX_CUDA_TRY(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, kGridThreads, 0));
+    return static_cast<unsigned>(blocks);
+  };
+  return multiprocessors *
+         std::min(per_multiprocessor(grid_search<false>), per_multiprocessor(grid_search<true>));
 }
 
 void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned max_blocks,
@@ -172,7 +211,9 @@ void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned ma
   config.stream = stream;
   config.attrs = &cooperative;
   config.numAttrs = 1;
-  JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, grid_search, shared_out, output));
+  Kernel* const kernel =
+      args.input.periodic.known != nullptr ? grid_search<true> : grid_search<false>;
+  JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, kernel, shared_out, output));
 }
 
 }  // namespace cuda

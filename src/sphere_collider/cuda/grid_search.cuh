@@ -31,7 +31,7 @@ struct SearchStorage {
 /// each searches every `lanes`-th row of cells. The search covers the level of the sphere and all
 /// wider levels on which it can have a neighbor. On its own level, a pair is found from the sphere
 /// whose cell is first in the order of z, y, x or, in one cell, from the lower position.
-template <bool kDense>
+template <bool kDense, bool kPeriodic>
 class Searcher {
  public:
   __device__ Searcher(const GridArgs& args, const GridPlan& plan, SearchStorage<kDense>& storage)
@@ -85,6 +85,7 @@ class Searcher {
     const auto high = [&](Real x, Real scale) { return cell_of(moved(x, search_radius), scale); };
     level_ = level;
     error_bound_ = error_bound_of(self_.radius + half);
+    doubt_ = doubt_of<kPeriodic>(args_.input.periodic, error_bound_, self_.radius + half);
     const Real inverse_x = inverse_x_of(inverse, plan_.scale);
     x0_ = low(self_.centre.x, inverse_x), x1_ = high(self_.centre.x, inverse_x);
     y0_ = low(self_.centre.y, inverse), y1_ = high(self_.centre.y, inverse);
@@ -190,7 +191,7 @@ class Searcher {
   }
 
   __device__ void hold(std::uint32_t other, std::uint32_t key, Real its_excess) {
-    uncertain_ = uncertain_ || !(its_excess < -error_bound_);
+    uncertain_ = uncertain_ || !(its_excess < -doubt_);
     storage_.held[held_][threadIdx.x] = other;
     if constexpr (!kDense) {
       storage_.rows.keys[held_][threadIdx.x] = key;
@@ -219,11 +220,12 @@ class Searcher {
       const unsigned slot = i - (owners_sum - owners_held);
       const unsigned thread = threadIdx.x - lane_id() + owner;
       const std::uint32_t other = storage_.held[slot][thread];
-      if (uncertain && !touch(load_sorted(args_.table.sorted + position),
-                              load_sorted(args_.table.sorted + other))) {
+      if (uncertain && !kPeriodic &&
+          !touch(load_sorted(args_.table.sorted + position),
+                 load_sorted(args_.table.sorted + other))) {
         continue;
       }
-      accept(position, other, slot, thread);
+      accept(position, other, slot, thread, uncertain);
     }
     __syncwarp();
     held_ = 0;
@@ -231,16 +233,27 @@ class Searcher {
   }
 
   __device__ void accept(std::uint32_t position, std::uint32_t other_position, unsigned slot,
-                         unsigned thread) {
+                         unsigned thread, [[maybe_unused]] bool uncertain) {
     const std::uint32_t id = args_.table.ids[position], other_id = args_.table.ids[other_position];
     if constexpr (!kDense) {
       const SphereInstance other = load_sorted(args_.table.sorted + other_position);
       const std::uint32_t key = storage_.rows.keys[slot][thread];
       if (!is_in_row(other, key, storage_.rows.levels[slot][thread])) return;
     }
-    const bool first = id < other_id;
+    const bool first = sphere_of<kPeriodic>(id) < sphere_of<kPeriodic>(other_id);
+    const std::uint32_t at_a = first ? position : other_position, a = first ? id : other_id,
+                        b = sphere_of<kPeriodic>(first ? other_id : id);
+    if constexpr (kPeriodic) {
+      // A sphere and an image of a lower one are found as that one and an image of the sphere.
+      if (is_image(a) || a == b) return;
+      const std::uint32_t at_b = first ? other_position : position;
+      if (uncertain && !touch_exactly<true>(args_.input, a, load_sorted(args_.table.sorted + at_a),
+                                            b, load_sorted(args_.table.sorted + at_b))) {
+        return;
+      }
+    }
     ++found_;
-    add_pair(first ? position : other_position, min(id, other_id), max(id, other_id));
+    add_pair(at_a, a, b);
   }
 
   __device__ bool is_in_row(const SphereInstance& sphere, std::uint32_t key, int level) const {
@@ -290,6 +303,7 @@ class Searcher {
   // The searched level, its cells within the search radius, and its next row.
   int level_ = 0;
   Real error_bound_ = 0;  // of excess() on this level
+  Real doubt_ = 0;        // see doubt_of()
   std::int32_t x0_ = 0, x1_ = 0, y0_ = 0, y1_ = 0, z1_ = 0, y_ = 0, z_ = 0;
   std::uint32_t row_ = 0, next_row_ = 0, next_slice_ = 0;  // buckets in a dense table
   bool own_row_is_next_ = false;

@@ -66,10 +66,14 @@ class Rows {
     next_z_ = static_cast<std::uint32_t>((box.ny - rows_y_ + 1) * box.nx);
   }
   __device__ std::int32_t left() const { return left_; }
-  /// The positions of the spheres in the next row; empty after the last row.
+  /// The positions of the spheres in the next row.
+  __device__ uint2 peek(const std::uint32_t* table) const {
+    return {table[first_], table[first_ + cells_]};
+  }
+  /// The same, and continues; empty after the last row.
   __device__ uint2 next(const std::uint32_t* table) {
     if (left_ <= 0) return {0, 0};
-    const uint2 positions{table[first_], table[first_ + cells_]};
+    const uint2 positions = peek(table);
     skip();
     return positions;
   }
@@ -95,24 +99,31 @@ struct SingleLevelStorage {
   };
 };
 
+template <bool kPeriodic>
 class SingleLevelSearcher {
  public:
   __device__ SingleLevelSearcher(const GridArgs& args, const SearchOutput& output,
-                                 SingleLevelStorage& storage)
-      : args_(args), staging_(staging_output(args, output)), s_(storage), top_(&held(0)) {}
+                                 const GridPlan& plan, SingleLevelStorage& storage)
+      : args_(args),
+        plan_(plan),
+        staging_(staging_output(args, output)),
+        s_(storage),
+        top_(&held(0)) {}
 
   /// Call from all lanes of a warp, for consecutive positions.
   __device__ void run(std::uint32_t position) {
-    const bool searching = position < args_.input.n;
-    position_ = searching ? position : 0;
-    const SingleLevel level(*args_.plan);
+    const bool exists = position < args_.input.n;
+    position_ = exists ? position : 0;
+    const SingleLevel level(plan_);
     CellRange near{{0, 0}, {0, -1}, {0, -1}};
+    if (exists) id_ = args_.table.ids[position];
+    const bool searching = exists && !(kPeriodic && is_image(id_));
     if (searching) {
       self_ = load_sorted(args_.table.sorted + position);
-      id_ = args_.table.ids[position];
       near = neighbor_cells(level, self_);
     }
     error_bound_ = error_bound_of(2 * level.half);
+    doubt_ = doubt_of<kPeriodic>(args_.input.periodic, error_bound_, 2 * level.half);
     Rows rows(level.box, near);
     while (__any_sync(kFullWarp, rows.left() > 0)) {
       uint2 ranges[kRowsHeld];
@@ -129,10 +140,14 @@ class SingleLevelSearcher {
       test_candidates(past, warp_max(steps));
     }
     keep_neighbors();
+    if (kPeriodic && is_doubtful_) {
+      if (searching) list_row_again(args_, position_);
+      kept_ = not_kept_ = 0;
+    }
     // Contacts of a long row are not staged.
     if (not_kept_ != 0) not_kept_ += kept_, kept_ = 0;
     sort_neighbors();
-    write_to_staging_buffer(searching);
+    write_to_staging_buffer(searching && !is_doubtful_);
   }
 
  private:
@@ -167,11 +182,13 @@ class SingleLevelSearcher {
 
   /// Keeps those held spheres that touch and have a larger index; only counts them beyond kMaxKept.
   __device__ void keep_neighbors() {
-    const bool uncertain = __any_sync(kFullWarp, !(largest_excess_ < -error_bound_));
+    const bool is_certain = largest_excess_ < -doubt_;
+    if (kPeriodic && !is_certain) is_doubtful_ = true;
+    const bool uncertain = !kPeriodic && __any_sync(kFullWarp, !is_certain);
     std::uint32_t* to = &held(kept_);
     for (const std::uint32_t* from = to; from < top_; from += 32) {
-      const std::uint32_t position = *from;
-      if (args_.table.ids[position] <= id_) continue;
+      const std::uint32_t position = *from, b = neighbor(position);
+      if (b <= id_) continue;
       if (uncertain && !touch(self_, load_sorted(args_.table.sorted + position))) continue;
       *to = position;
       to += 32;
@@ -183,6 +200,10 @@ class SingleLevelSearcher {
     __syncwarp();
   }
   __device__ std::uint32_t& held(unsigned k) { return s_.held[32 * k + lane_id()]; }
+  /// The sphere at a position, or that which the image there is of.
+  __device__ std::uint32_t neighbor(std::uint32_t position) const {
+    return sphere_of<kPeriodic>(args_.table.ids[position]);
+  }
 
   /// Sorts the first kRanked neighbors by rank (number of smaller neighbors). Inserts further
   /// neighbors, which are rare.
@@ -194,7 +215,7 @@ class SingleLevelSearcher {
       positions[k] = k < kept_ ? held(k) : 0;
     }
 #pragma unroll
-    for (unsigned k = 0; k < kRanked; ++k) ids[k] = k < kept_ ? args_.table.ids[positions[k]] : ~0u;
+    for (unsigned k = 0; k < kRanked; ++k) ids[k] = k < kept_ ? neighbor(positions[k]) : ~0u;
 #pragma unroll
     for (unsigned k = 1; k < kRanked; ++k) {
 #pragma unroll
@@ -211,9 +232,9 @@ class SingleLevelSearcher {
       if (k < kept_) held(ranks[k]) = positions[k];
     }
     for (unsigned k = kRanked; k < kept_; ++k) {
-      const std::uint32_t position = held(k), id = args_.table.ids[position];
+      const std::uint32_t position = held(k), id = neighbor(position);
       unsigned to = k;
-      for (; to > 0 && args_.table.ids[held(to - 1)] > id; --to) {
+      for (; to > 0 && neighbor(held(to - 1)) > id; --to) {
         held(to) = held(to - 1);
       }
       held(to) = position;
@@ -231,12 +252,7 @@ class SingleLevelSearcher {
       atomicAdd(&args_.rows.bin_sums[id_ / kBin],
                 static_cast<unsigned long long>(kept_ + not_kept_));
     }
-    if (not_kept_ != 0) {
-      args_.rows.offsets[id_] = staged_list(not_kept_, StagedList::kNotStaged).bits;
-      args_.table.positions[id_] = position_;
-      atomicAdd(&args_.state->long_row_contacts, static_cast<unsigned long long>(not_kept_));
-      atomicAdd(&args_.state->overflow, 1ull);
-    }
+    if (not_kept_ != 0) record_long_row(args_, id_, position_, not_kept_);
     if (index + all <= args_.rows.capacity) write(index, sum, all);
   }
 
@@ -252,7 +268,7 @@ class SingleLevelSearcher {
       const std::uint32_t a = __shfl_sync(kFullWarp, id_, owner);
       if (i < all) {
         const std::uint32_t position = s_.held[32 * slot + owner];
-        const std::uint32_t b = args_.table.ids[position];
+        const std::uint32_t b = neighbor(position);
         const SphereInstance self = load_sorted(args_.table.sorted + first_position + owner);
         write_or_stage(staging_, index + i, a, b, self, load_sorted(args_.table.sorted + position),
                        s_.staged);
@@ -261,35 +277,46 @@ class SingleLevelSearcher {
         write_staged(s_.staged, min(32u, all - first), staging_.contacts + index + first);
       }
     }
+    __syncwarp();
   }
 
   const GridArgs& args_;
+  const GridPlan& plan_;
   SearchOutput staging_;
   SingleLevelStorage& s_;
   std::uint32_t position_ = 0, id_ = 0;
   SphereInstance self_;
   Real error_bound_ = 0;                                          // of excess()
+  Real doubt_ = 0;                                                // see doubt_of()
   Real largest_excess_ = -std::numeric_limits<Real>::infinity();  // of the spheres held
   std::uint32_t* top_;                                            // slot of the next sphere to hold
   unsigned kept_ = 0;           // neighbors b > a at the start of the column
   std::uint32_t not_kept_ = 0;  // neighbors that were only counted, because the row is long
+  bool is_doubtful_ = false;    // of a search in a periodic cell
 };
 
-/// A warp writes the neighbors b > a of the sphere a at a position, in any order.
-__device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& level,
-                                      std::uint32_t position, std::uint32_t* neighbors) {
+/// A warp finds the neighbors b > a of the sphere a at a position, and writes up to `capacity` of
+/// them in any order.
+/// @return the number of neighbors
+template <bool kPeriodic>
+__device__ std::uint32_t list_neighbors(const GridArgs& args, const SingleLevel& level,
+                                        std::uint32_t position, std::uint32_t* neighbors,
+                                        std::uint32_t capacity = ~0u) {
   const SphereInstance self = load_sorted(args.table.sorted + position);
   const std::uint32_t a = args.table.ids[position];
+  const Real bound = error_bound_of(2 * level.half),
+             doubt = doubt_of<kPeriodic>(args.input.periodic, bound, 2 * level.half);
   Rows rows(level.box, neighbor_cells(level, self));
+  std::uint32_t count = 0;
   while (rows.left() > 0) {
-    uint2 mine{0, 0};  // the row of this lane
+    Rows at_mine = rows;  // the row of this lane
+    bool has_row = false;
     for (unsigned k = 0; k < 32 && rows.left() > 0; ++k) {
-      if (k == lane_id()) {
-        mine = rows.next(args.table.starts);
-      } else {
-        rows.skip();
-      }
+      if (k == lane_id()) at_mine = rows, has_row = true;
+      rows.skip();
     }
+    uint2 mine{0, 0};
+    if (has_row) mine = at_mine.peek(args.table.starts);
     const std::uint32_t sum = warp_inclusive_sum(mine.y - mine.x);
     const std::uint32_t candidates = __shfl_sync(kFullWarp, sum, 31);
     for (std::uint32_t first = 0; first < candidates; first += 32) {
@@ -298,16 +325,79 @@ __device__ inline void list_neighbors(const GridArgs& args, const SingleLevel& l
       const std::uint32_t past = __shfl_sync(kFullWarp, mine.y, owner);
       const std::uint32_t k = past - (__shfl_sync(kFullWarp, sum, owner) - i);
       std::uint32_t b = 0;
-      if (i < candidates && touch(self, load_sorted(args.table.sorted + k))) b = args.table.ids[k];
+      if (i < candidates) {
+        const SphereInstance other = load_sorted(args.table.sorted + k);
+        const Real e = excess(self, other);
+        if (!(e > bound)) b = sphere_of<kPeriodic>(args.table.ids[k]);
+        if (b > a && !(e < -doubt) && !touch_exactly<kPeriodic>(args.input, a, self, b, other)) {
+          b = 0;
+        }
+      }
       const unsigned found = __ballot_sync(kFullWarp, b > a);
-      if (b > a) neighbors[__popc(found & lanes_below())] = b;
-      neighbors += __popc(found);
+      const std::uint32_t at = count + static_cast<std::uint32_t>(__popc(found & lanes_below()));
+      if (b > a && at < capacity) neighbors[at] = b;
+      count += static_cast<std::uint32_t>(__popc(found));
     }
+  }
+  return count;
+}
+
+/// A warp sorts a row of up to kMaxStaged neighbors by rank (number of smaller neighbors).
+__device__ inline void sort_row_of_warp(std::uint32_t* row, std::uint32_t length) {
+  constexpr unsigned kOfLane = (kMaxStaged + 31) / 32;
+  std::uint32_t ids[kOfLane], ranks[kOfLane] = {};
+#pragma unroll
+  for (unsigned k = 0; k < kOfLane; ++k) {
+    const unsigned i = 32 * k + lane_id();
+    ids[k] = i < length ? row[i] : ~0u;
+  }
+  for (std::uint32_t i = 0; i < length; ++i) {
+    const std::uint32_t id = row[i];
+#pragma unroll
+    for (unsigned k = 0; k < kOfLane; ++k) ranks[k] += id < ids[k] ? 1 : 0;
+  }
+  __syncwarp();
+#pragma unroll
+  for (unsigned k = 0; k < kOfLane; ++k) {
+    if (32 * k + lane_id() < length) row[ranks[k]] = ids[k];
+  }
+  __syncwarp();
+}
+
+/// Shared memory of a warp.
+struct RowStorage {
+  std::uint32_t row[kMaxStaged];
+};
+
+/// Stages the rows of list_row_again(), after exact tests where they are needed: a warp for each.
+/// @pre the output is of pairs, as always in a periodic cell
+__device__ inline void stage_rows_again(const GridArgs& args, const SearchOutput& output,
+                                        const GridPlan& plan, RowStorage& s) {
+  const SingleLevel level(plan);
+  const SearchOutput staging = staging_output(args, output);
+  const std::uint32_t rows = args.state->rows_again;
+  for (std::uint32_t k = blockIdx.x * kGridWarps + threadIdx.x / 32; k < rows;
+       k += gridDim.x * kGridWarps) {
+    const std::uint32_t position = args.table.ranks[k], a = args.table.ids[position];
+    const std::uint32_t length = list_neighbors<true>(args, level, position, s.row, kMaxStaged),
+                        staged = length <= kMaxStaged ? length : 0;
+    unsigned long long index = 0;
+    if (lane_id() == 0) {
+      index = atomicAdd(&args.state->contacts, static_cast<unsigned long long>(staged));
+      record_row(args, a, position, length, index);
+    }
+    index = __shfl_sync(kFullWarp, index, 0);
+    __syncwarp();
+    if (index + staged > args.rows.capacity) continue;
+    sort_row_of_warp(s.row, staged);
+    for (std::uint32_t i = lane_id(); i < staged; i += 32) staging.neighbors[index + i] = s.row[i];
+    __syncwarp();
   }
 }
 
 /// Writes the neighbors of all rows that were not staged to Rows::long_row_neighbors.
-__device__ inline void list_long_rows(const GridArgs& args, const GridPlan& plan) {
+template <bool kPeriodic>
+__device__ void list_long_rows(const GridArgs& args, const GridPlan& plan) {
   const SingleLevel level(plan);
   const std::uint32_t long_rows = args.state->long_rows,
                       all = long_rows + args.state->very_long_rows;
@@ -315,8 +405,8 @@ __device__ inline void list_long_rows(const GridArgs& args, const GridPlan& plan
        k += gridDim.x * kGridWarps) {
     const std::uint32_t a =
         k < long_rows ? args.rows.long_rows[k] : args.rows.very_long_rows[k - long_rows];
-    list_neighbors(args, level, args.table.positions[a],
-                   args.rows.long_row_neighbors + args.rows.offsets[a]);
+    list_neighbors<kPeriodic>(args, level, args.table.positions[a],
+                              args.rows.long_row_neighbors + args.rows.offsets[a]);
   }
 }
 

@@ -84,13 +84,15 @@ __device__ inline void count_coarse(const GridArgs& args, const GridPlan& plan,
 }
 
 /// Sorts a tile of spheres by coarse bucket, and writes it to Scratch::partitioned.
+/// @param size of a tile, but the last
 template <bool kLarge>
-__device__ inline void partition(const GridArgs& args, const GridPlan& plan, TileStorage<kLarge>& s,
+__device__ inline void partition(const GridArgs& args, const GridPlan& plan, unsigned size,
+                                 TileStorage<kLarge>& s,
                                  CountSumStorage<TileStorage<kLarge>::kThreads>& sums) {
   constexpr unsigned kThreads = s.kThreads, kOfThread = s.kOfThread;
-  const std::uint64_t tile = std::uint64_t{blockIdx.x} * s.kSpheres;
+  const std::uint64_t tile = std::uint64_t{blockIdx.x} * size;
   const auto count =
-      static_cast<unsigned>(min(std::uint64_t{args.input.n} - tile, std::uint64_t{s.kSpheres}));
+      static_cast<unsigned>(min(std::uint64_t{args.input.n} - tile, std::uint64_t{size}));
   SphereInstance spheres[kOfThread];
 #pragma unroll
   for (unsigned k = 0; k < kOfThread; ++k) {
@@ -132,7 +134,7 @@ __device__ inline void partition(const GridArgs& args, const GridPlan& plan, Til
     const std::uint32_t bucket = tile_places[k] >> 16,
                         to = s.counts[bucket] + (tile_places[k] & 0xffffu);
     s.spheres[to] = spheres[k];
-    s.ids[to] = static_cast<std::uint32_t>(tile + i);
+    s.ids[to] = id_of(args.input, tile + i);
     s.buckets[to] = static_cast<std::uint16_t>(bucket);
   }
   __syncthreads();
@@ -244,7 +246,7 @@ __device__ inline void sort_coarse(const GridArgs& args, const GridPlan& plan,
     const auto place = [&](std::uint32_t to, std::uint32_t id, const SphereInstance& sphere) {
       args.table.sorted[to] = sphere;
       args.table.ids[to] = id;
-      if (!plan.single) args.table.positions[id] = to;
+      if (!plan.single && !is_image(id)) args.table.positions[id] = to;
     };
     if (fits) {
       for (std::uint32_t i = threadIdx.x; i < past - first; i += blockDim.x) {

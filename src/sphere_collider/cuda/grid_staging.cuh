@@ -38,8 +38,37 @@ __device__ inline SearchOutput staging_output(const GridArgs& args, const Search
   return staging;
 }
 
+/// Records that row `a`, of the sphere at a position, is too long to be staged.
+__device__ inline void record_long_row(const GridArgs& args, std::uint32_t a,
+                                       std::uint32_t position, std::uint32_t length) {
+  args.rows.offsets[a] = staged_list(length, StagedList::kNotStaged).bits;
+  args.table.positions[a] = position;
+  atomicAdd(&args.state->long_row_contacts, static_cast<unsigned long long>(length));
+  atomicAdd(&args.state->overflow, 1ull);
+}
+/// Records a row that is staged from `index` on, unless it is too long.
+__device__ inline void record_row(const GridArgs& args, std::uint32_t a, std::uint32_t position,
+                                  std::uint32_t length, unsigned long long index) {
+  atomicAdd(&args.rows.bin_sums[a / kBin], static_cast<unsigned long long>(length));
+  if (length <= kMaxStaged) {
+    args.rows.offsets[a] = staged_list(index, length).bits;
+  } else {
+    record_long_row(args, a, position, length);
+  }
+}
+
+/// Lists the row of the sphere at a position for stage_rows_again(). A search in a periodic cell
+/// does not write a row if a distance is too close to the sum of the radii to decide it from
+/// reduced spheres and images, or if the row has too many neighbors for it: the code for these
+/// cases would cost the registers of all.
+__device__ inline void list_row_again(const GridArgs& args, std::uint32_t position) {
+  args.table.ranks[atomicAdd(&args.state->rows_again, 1u)] = position;
+}
+
 static_assert(kBin == kGridThreads);
-__device__ inline std::uint32_t bins_of(std::uint32_t n) { return (n - 1) / kBin + 1; }
+__device__ inline std::uint32_t bins_of(const GridArgs& args) {
+  return (args.input.rows() - 1) / kBin + 1;
+}
 
 struct CopyStorage {
   // Start of a row in the staging buffer and in the output, each minus its start in the bin.
@@ -95,7 +124,7 @@ __device__ inline void copy_pairs(const std::uint32_t* staging, const SearchOutp
 
 /// Sums the pairs of each group of kBinsOfSum bins.
 __device__ inline void sum_bins(const GridArgs& args) {
-  const std::uint32_t bins = bins_of(args.input.n);
+  const std::uint32_t bins = bins_of(args);
   const unsigned warps = gridDim.x * kGridWarps;
   for (std::uint32_t sum = blockIdx.x * kGridWarps + threadIdx.x / 32; sum * kBinsOfSum < bins;
        sum += warps) {
@@ -127,7 +156,7 @@ __device__ inline unsigned long long copy_bin(const GridArgs& args, const Search
                                               std::uint32_t bin, unsigned long long before,
                                               CopyStorage& s) {
   const std::uint32_t a = bin * kBin + threadIdx.x;
-  const StagedList list{a < args.input.n ? args.rows.offsets[a] : 0};
+  const StagedList list{a < args.input.rows() ? args.rows.offsets[a] : 0};
   const std::uint32_t count = list.count(), staged = list.staged();
   // One scan computes two sums: of staged contacts (low bits, at most kMaxStaged * kGridThreads),
   // and of all contacts.
@@ -159,7 +188,7 @@ __device__ inline unsigned long long copy_bin(const GridArgs& args, const Search
 
 /// Copies all bins, distributed over all blocks of the kernel.
 __device__ inline void copy_bins(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
-  const std::uint32_t bins = bins_of(args.input.n);
+  const std::uint32_t bins = bins_of(args);
   const std::uint32_t first = std::uint64_t{bins} * blockIdx.x / gridDim.x,
                       past = std::uint64_t{bins} * (blockIdx.x + 1) / gridDim.x;
   if (first == past) return;

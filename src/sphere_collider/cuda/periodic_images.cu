@@ -1,256 +1,279 @@
-/// Reduction to a periodic cell, images, and the selection of the nearest images.
+/// Reduction to a periodic cell, images, and the shifts and contacts of pairs.
 #include "src/base/cuda/launch.cuh"
+#include "src/sphere_collider/cuda/grid_build.cuh"
 #include "src/sphere_collider/cuda/item_list.cuh"
 #include "src/sphere_collider/cuda/periodic_images.hpp"
-#include "src/sphere_collider/cuda/search.cuh"
+#include "src/sphere_collider/cuda/periodic_pairs.cuh"
 #include "src/sphere_collider/cuda/systems.hpp"
-
-#include <bit>
-#include <type_traits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 namespace {
 
-/// Positive numbers are ordered as their bits.
-using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, unsigned long long>;
+constexpr unsigned kListWarps = kListThreads / 32;
+static_assert(kListThreads == kGridThreads, "prepare() uses BlockSums and is_last_block()");
+/// Up to this number of elements, threads process one at a time, because there are more threads
+/// than elements.
+constexpr std::size_t kFewForBatches = 1 << 18;
 
-__device__ const PeriodicCell& cell_of(const PeriodicArgs& args, std::size_t i) {
-  if (args.systems == 0) return args.cell;
-  return args.cells[system_of(args.offsets, args.systems, static_cast<std::uint32_t>(i))];
+__device__ SphereInstance load_given(const PeriodicArgs& args, std::size_t i) {
+  const bool is_first = i < args.first.count;
+  return load_from(is_first ? args.first : args.second, is_first ? i : i - args.first.count);
 }
 
+/// Finds the largest radius, unless all have the same.
 __global__ void __launch_bounds__(kListThreads)
-    reduce(PeriodicArgs args, const SphereInstance* spheres) {
+    measure_radii(const __grid_constant__ PeriodicArgs args) {
   wait_for_previous_kernel();
   Real largest = 0;
-  std::uint32_t has_bad = 0;
   for (std::size_t i = first_element(); i < args.n; i += element_stride()) {
-    SphereInstance sphere = load_sphere(spheres + i);
-    args.given[i].sphere = sphere;
-    const PeriodicCell& cell = cell_of(args, i);
-    if (is_valid(sphere) && detail::fits(cell, sphere.radius) &&
-        detail::is_reducible(sphere.centre, cell)) {
-      sphere = detail::reduced(sphere, cell, &args.given[i].displacement);
-      largest = max(largest, sphere.radius);
-    } else {
-      has_bad = 1;
-    }
-    args.reduced[i] = sphere;
+    largest = max(largest, load_given(args, i).radius);
   }
   largest = warp_max(largest);
-  has_bad = warp_max(has_bad);
-  if (lane_id() != 0) return;
-  atomicMax(&args.state->largest_radius, std::bit_cast<Bits>(largest));
-  if (has_bad != 0) args.state->has_bad = 1;
+  if (lane_id() == 0) atomicMax(&args.state->largest_radius, bits_of(largest));
 }
 
-/// The images of reduced sphere i that may touch a sphere in the cell.
-__device__ std::uint32_t near_images(const PeriodicArgs& args, std::size_t i,
-                                     const SphereInstance& sphere) {
-  const auto radius = std::bit_cast<Real>(static_cast<Bits>(args.state->largest_radius));
-  return detail::near_images(sphere.centre, cell_of(args, i), 2 * radius);
-}
-
-__global__ void __launch_bounds__(kListThreads) count_images(PeriodicArgs args) {
-  wait_for_previous_kernel();
-  for (std::size_t i = first_element(); i < args.n; i += element_stride()) {
-    const std::uint32_t codes = near_images(args, i, load_sphere(args.reduced + i));
-    args.counts[i] = static_cast<std::uint32_t>(__popc(codes));
+__device__ CellPoint::Cells packed(const ImageShift& cells) {
+  constexpr std::int32_t kBias = 1 << (CellPoint::kBits - 1);
+  CellPoint::Cells result = 0;
+  bool fits = true;
+  for (std::size_t k = 3; k-- > 0;) {
+    fits = fits && cells[k] >= -kBias && cells[k] < kBias;
+    result = result << CellPoint::kBits | static_cast<std::uint32_t>(cells[k] + kBias);
   }
-  if (blockIdx.x == 0 && threadIdx.x == 0) args.counts[args.n] = 0;
+  return fits ? result : CellPoint::kFarCells;
+}
+/// Number k of packed(), or that of detail::reduce() if they were too large.
+__device__ std::int32_t unpacked(const CellPoint& point, const PeriodicCell& cell, int k) {
+  constexpr std::int32_t kBias = 1 << (CellPoint::kBits - 1);
+  if (point.cells == CellPoint::kFarCells) {
+    Real x = point.centre[k];
+    return detail::reduce(&x, cell.lengths[k]);
+  }
+  const auto bits =
+      static_cast<std::uint32_t>(point.cells >> (CellPoint::kBits * static_cast<unsigned>(k)));
+  return static_cast<std::int32_t>(bits & (2 * kBias - 1)) - kBias;
+}
+
+/// @tparam kOfThread spheres of a thread whose loads and stores overlap
+template <unsigned kOfThread>
+__global__ void __launch_bounds__(kListThreads)
+    prepare(const __grid_constant__ PeriodicArgs args, Real largest_radius) {
+  wait_for_previous_kernel();
+  PeriodicState& state = *args.state;
+  if (largest_radius == 0) {
+    largest_radius = std::bit_cast<Real>(static_cast<RealBits>(state.largest_radius));
+  }
+  __shared__ BlockSums::TempStorage sums;
+  __shared__ unsigned long long images_before;
+  const Real reach = 2 * detail::reduced_radius(largest_radius, args.errors);
+  bool has_bad = false;
+  for (std::size_t first = kOfThread * (first_element() - threadIdx.x); first < args.n;
+       first += kOfThread * element_stride()) {
+    const auto index = [&](unsigned k) { return first + k * kListThreads + threadIdx.x; };
+    SphereInstance spheres[kOfThread];
+    std::uint32_t codes[kOfThread], count = 0;
+#pragma unroll
+    for (unsigned k = 0; k < kOfThread; ++k) {
+      spheres[k] = load_given(args, index(k) < args.n ? index(k) : 0);
+    }
+#pragma unroll
+    for (unsigned k = 0; k < kOfThread; ++k) {
+      codes[k] = 0;
+      if (index(k) >= args.n) continue;
+      SphereInstance& sphere = spheres[k];
+      args.given[index(k)] = sphere;
+      CellPoint point{sphere.centre, 0};
+      if (is_valid_in(args.cell, sphere)) {
+        ImageShift cells;
+        sphere = detail::reduced(sphere, args.cell, args.errors, &cells);
+        point.cells = packed(cells);
+        codes[k] = detail::near_images(sphere.centre, args.cell, reach);
+      } else {
+        has_bad = true;
+      }
+      args.points[index(k)] = point;
+      args.reduced[index(k)] = sphere;
+      count += static_cast<std::uint32_t>(__popc(codes[k]));
+    }
+    // One atomic for a block: those on one address are serialized.
+    unsigned long long all = 0, at = block_exclusive_sum(count, sums, all);
+    if (threadIdx.x == 0 && all != 0) images_before = atomicAdd(&state.images, all);
+    __syncthreads();
+    at += images_before;
+#pragma unroll
+    for (unsigned k = 0; k < kOfThread; ++k) {
+      for (; codes[k] != 0 && at < args.capacity; codes[k] &= codes[k] - 1, ++at) {
+        const auto code = static_cast<std::uint32_t>(__ffs(static_cast<int>(codes[k])) - 1);
+        args.images[at] = image_id(static_cast<std::uint32_t>(index(k)));
+        args.reduced[args.n + at] = detail::image_of(spheres[k], detail::shift_of(code), args.cell);
+      }
+    }
+  }
+  if (__any_sync(kFullWarp, has_bad) && lane_id() == 0) state.has_bad = 1;
+  if (!is_last_block(state.blocks_passed) || threadIdx.x != 0) return;
+  const unsigned long long images = __ldcg(&state.images);
+  const bool valid = __ldcg(&state.has_bad) == 0, complete = images <= args.capacity;
+  bool may_touch_twice = false;
+  for (int k = 0; k < 3; ++k) {
+    may_touch_twice = may_touch_twice || (args.cell.repeats[static_cast<std::size_t>(k)] &&
+                                          detail::may_touch_twice(reach, args.cell.lengths[k]));
+  }
+  const bool ready = valid && complete;
+  *args.known = {args.given, args.cell, ready ? args.n + static_cast<std::uint32_t>(images) : 0,
+                 may_touch_twice};
+  state = {};
+  write_signal(args.signal, images, valid, complete);
+}
+
+__device__ const PeriodicCell& cell_of_sphere(const SpheresInCells& in, std::size_t i) {
+  if (in.systems == 0) return in.cell;
+  return in.cells[system_of(in.offsets, in.systems, static_cast<std::uint32_t>(i))];
+}
+
+/// Loads a point through the read-only cache.
+__device__ CellPoint load_point(const CellPoint* p) {
+  static_assert(sizeof(CellPoint) == sizeof(SphereInstance));
+  return std::bit_cast<CellPoint>(load_sphere(reinterpret_cast<const SphereInstance*>(p)));
+}
+
+/// The shift of spheres a < b that touch.
+__device__ ImageShift shift_of_pair(const SpheresInCells& in, std::uint32_t a, std::uint32_t b) {
+  return detail::shift_of_touching(load_sphere(in.spheres + a), load_sphere(in.spheres + b),
+                                   cell_of_sphere(in, a));
+}
+/// The same from the points, for spheres that do not touch twice.
+__device__ ImageShift shift_of_points(const CellPoint& p, const CellPoint& q,
+                                      const PeriodicCell& cell) {
+  ImageShift result{};
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    if (!cell.repeats[axis]) continue;
+    const std::int32_t of_p = unpacked(p, cell, k), of_q = unpacked(q, cell, k);
+    const Real length = cell.lengths[k], half = length / 2,
+               x = fused(-static_cast<Real>(of_p), length, p.centre[k]),
+               y = fused(-static_cast<Real>(of_q), length, q.centre[k]), difference = x - y;
+    result[axis] = of_p - of_q + (difference > half ? 1 : difference < -half ? -1 : 0);
+  }
+  return result;
 }
 
 __global__ void __launch_bounds__(kListThreads)
-    append_images(PeriodicArgs args, SphereInstance* spheres) {
-  wait_for_previous_kernel();
-  for (std::size_t i = first_element(); i < args.n; i += element_stride()) {
-    const SphereInstance sphere = load_sphere(args.reduced + i);
-    spheres[i] = sphere;
-    unsigned long long at = args.begins[i];
-    for (std::uint32_t codes = near_images(args, i, sphere); codes != 0; codes &= codes - 1, ++at) {
-      const auto code = static_cast<std::uint32_t>(__ffs(static_cast<int>(codes)) - 1);
-      args.images[at] = {static_cast<std::uint32_t>(i), code};
-      spheres[args.n + at] = detail::image_of(sphere, detail::shift_of(code), cell_of(args, i));
-    }
-  }
-}
-
-/// items_before(items, n, a, b), for items of row `a` near `begin`, which is not greater.
-template <class Item>
-__device__ std::size_t items_before_from(const Item* items, std::size_t begin, std::size_t n,
-                                         std::uint64_t a, std::uint64_t b) {
-  std::size_t low = begin, step = 1;
-  const auto is_before = [&](std::size_t i) {
-    return items[i].a < a || (items[i].a == a && items[i].b < b);
-  };
-  while (low + step <= n && is_before(low + step - 1)) {
-    low += step;
-    step *= 2;
-  }
-  const std::size_t high = low + step - 1 < n ? low + step - 1 : n;
-  return low + items_before(items + low, high - low, a, b);
-}
-
-/// The sphere b of an item of row a, or the sphere that b is an image of, and the code of its
-/// shift.
-__device__ PeriodicImage image_at(const PeriodicArgs& args, std::uint32_t b) {
-  return b < args.n ? PeriodicImage{b, detail::kNoShift} : args.images[b - args.n];
-}
-
-/// The shift between the given centres of two spheres whose reduced ones have a shift.
-__device__ ImageShift shift_between(const ImageShift& displacement_a,
-                                    const ImageShift& displacement_b, std::uint32_t code) {
-  ImageShift shift = detail::shift_of(code);
-  for (std::size_t k = 0; k < 3; ++k) shift[k] += displacement_a[k] - displacement_b[k];
-  return shift;
-}
-
-/// The exact test of a pair whose reduced spheres or images touch.
-template <class Item>
-__device__ PairResult touch_of(const PeriodicArgs& args, const Item& item) {
-  const PeriodicImage image = image_at(args, item.b);
-  const DisplacedSphere &a = args.given[item.a], &b = args.given[image.sphere];
-  return detail::touch_at(load_sphere(&a.sphere), load_sphere(&b.sphere),
-                          shift_between(a.displacement, b.displacement, image.code),
-                          cell_of(args, item.a));
-}
-
-template <class Item>
-__device__ bool is_kept(const PeriodicArgs& args, Item* items, std::size_t n, std::size_t i) {
-  const std::uint32_t a = items[i].a;
-  if (a >= args.n) return false;
-  const PeriodicImage b = image_at(args, items[i].b);
-  if (b.sphere <= a) return false;  // an image of a touches the sphere with the higher index
-  const PairResult found = touch_of(args, items[i]);
-  if (found.touching == 0) return false;
-  if constexpr (std::is_same_v<Item, SphereContact>) {
-    items[i].normal = found.normal;
-    items[i].distance = found.distance;
-  }
-  // Unless another image of b with a lower shift touches.
-  if (b.code > detail::kNoShift) {
-    const std::size_t j = items_before(items, n, a, b.sphere);  // j <= i
-    if (items[j].a == a && items[j].b == b.sphere && touch_of(args, items[j]).touching != 0) {
-      return false;
-    }
-  }
-  const std::uint64_t first = args.n + args.begins[b.sphere];
-  const std::uint64_t last = args.n + args.begins[b.sphere + 1];
-  std::size_t j = i;
-  if (items[i].b < args.n) {
-    j = items_before_from(items, i, n, a, first);
-  } else {
-    while (j > 0 && items[j - 1].a == a && items[j - 1].b >= first) --j;
-  }
-  for (; j < n && items[j].a == a && items[j].b < last; ++j) {
-    if (args.images[items[j].b - args.n].code >= b.code) break;
-    if (touch_of(args, items[j]).touching != 0) return false;
-  }
-  return true;
-}
-
-template <class Item>
-__global__ void __launch_bounds__(kListThreads)
-    mark_kept(PeriodicArgs args, Item* items, std::size_t n, std::uint32_t* kept) {
+    make_contacts(const __grid_constant__ SpheresInCells in, const SpherePair* pairs, std::size_t n,
+                  SphereContact* contacts) {
   wait_for_previous_kernel();
   for (std::size_t i = first_element(); i < n; i += element_stride()) {
-    kept[i] = is_kept(args, items, n, i) ? 1 : 0;
-  }
-  if (blockIdx.x == 0 && threadIdx.x == 0) kept[n] = 0;
-}
-
-/// A row has its spheres, sorted, then its images, sorted by their spheres: each kept item comes
-/// after those before it in its own part and after those of lower spheres in the other part.
-template <class Item>
-__global__ void __launch_bounds__(kListThreads)
-    place_kept(PeriodicArgs args, const Item* items, std::size_t n, const std::uint32_t* kept,
-               const unsigned long long* places, Item* out, ImageShift* shifts,
-               ContactCount* count) {
-  wait_for_previous_kernel();
-  if (blockIdx.x == 0 && threadIdx.x == 0) *count = {places[n], kNoSphere, 1};
-  for (std::size_t i = first_element(); i < n; i += element_stride()) {
-    if (kept[i] == 0) continue;
-    Item item = items[i];
-    const PeriodicImage image = image_at(args, item.b);
-    std::size_t images, other;  // first image of the row; first item of the other part beyond b
-    if (item.b < args.n) {
-      images = items_before_from(items, i, n, item.a, args.n);
-      other = items_before_from(items, images, n, item.a, args.n + args.begins[item.b]);
-    } else {
-      item.b = image.sphere;
-      other = items_before(items, n, item.a, item.b);
-      images = items_before_from(items, other, n, item.a, args.n);
-    }
-    const unsigned long long at = places[i] + places[other] - places[images];
-    out[at] = item;
-    shifts[at] =
-        shift_between(args.given[item.a].displacement, args.given[item.b].displacement, image.code);
+    const SpherePair pair = pairs[i];
+    const PairResult touch =
+        detail::touch_at(load_sphere(in.spheres + pair.a), load_sphere(in.spheres + pair.b),
+                         shift_of_pair(in, pair.a, pair.b), cell_of_sphere(in, pair.a));
+    contacts[i] = {pair.a, pair.b, touch.normal, touch.distance};
   }
 }
 
 template <class Item>
+__device__ SpherePair pair_at(const FoundItems<Item>& found, std::size_t i) {
+  return {found.items[i].a, found.items[i].b};
+}
+template <class Index>
+__device__ SpherePair pair_at(const PairRows<Index>& rows, std::size_t i) {
+  return {static_cast<std::uint32_t>(rows.indices[i]),
+          static_cast<std::uint32_t>(rows.indices[rows.n + i])};
+}
+
+template <class Pairs, unsigned kOfThread>
 __global__ void __launch_bounds__(kListThreads)
-    write_shifts(FoundItems<Item> found, FoundItems<Item> half, const ImageShift* half_shifts,
-                 std::int32_t* shifts, std::size_t capacity) {
+    write_shifts(const __grid_constant__ SpheresInCells in, Pairs found, std::int32_t* shifts,
+                 std::size_t capacity) {
   wait_for_previous_kernel();
+  __shared__ std::int32_t staged[kListWarps][3 * 32 * kOfThread];
+  std::int32_t* const mine = staged[threadIdx.x / 32];
   const std::size_t n = found.n < capacity ? found.n : capacity;
-  for (std::size_t i = first_element(); i < n; i += element_stride()) {
-    const std::uint32_t a = found.items[i].a, b = found.items[i].b;
-    const std::size_t j = items_before(half.items, half.n, min(a, b), max(a, b));
-    const std::int32_t sign = a < b ? 1 : -1;
-    for (std::size_t k = 0; k < 3; ++k) shifts[3 * i + k] = sign * half_shifts[j][k];
+  const bool is_general = in.known == nullptr || in.known->may_touch_twice;
+  for (std::size_t first = kOfThread * (first_element() - lane_id()); first < n;
+       first += kOfThread * element_stride()) {
+    SpherePair pairs[kOfThread];
+#pragma unroll
+    for (unsigned k = 0; k < kOfThread; ++k) {
+      const std::size_t i = first + 32 * k + lane_id();
+      pairs[k] = pair_at(found, i < n ? i : n - 1);
+    }
+    const auto put = [&](unsigned k, const ImageShift& shift, std::int32_t sign) {
+      for (unsigned axis = 0; axis < 3; ++axis) {
+        mine[3 * (32 * k + lane_id()) + axis] = sign * shift[axis];
+      }
+    };
+    if (is_general) {
+#pragma unroll 1
+      for (unsigned k = 0; k < kOfThread; ++k) {
+        const std::size_t i = first + 32 * k + lane_id();
+        const auto [a, b] = pair_at(found, i < n ? i : n - 1);
+        put(k, shift_of_pair(in, min(a, b), max(a, b)), a < b ? 1 : -1);
+      }
+    } else {
+      CellPoint points[kOfThread][2];
+#pragma unroll
+      for (unsigned k = 0; k < kOfThread; ++k) {
+        points[k][0] = load_point(in.points + pairs[k].a);
+        points[k][1] = load_point(in.points + pairs[k].b);
+      }
+#pragma unroll
+      for (unsigned k = 0; k < kOfThread; ++k) {
+        put(k, shift_of_points(points[k][0], points[k][1], in.cell), 1);
+      }
+    }
+    __syncwarp();
+    // A warp writes whole memory sectors.
+#pragma unroll
+    for (unsigned k = 0; k < 3 * kOfThread; ++k) {
+      const std::size_t to = 3 * first + 32 * k + lane_id();
+      if (to < 3 * n) __stcs(shifts + to, mine[32 * k + lane_id()]);
+    }
+    __syncwarp();
   }
 }
 
 }  // namespace
 
-void launch_reduce(const PeriodicArgs& args, const SphereInstance* spheres, cudaStream_t stream) {
-  launch(reduce, list_blocks(args.n), 1, kListThreads, stream, args, spheres);
+void launch_prepare(const PeriodicArgs& args, cudaStream_t stream) {
+  const bool is_known = args.first.radii == nullptr && args.second.count == 0;
+  const Real largest = is_known ? args.first.radius : Real(0);
+  if (!is_known) launch(measure_radii, list_blocks(args.n), 1, kListThreads, stream, args);
+  if (args.n <= kFewForBatches) {
+    launch(prepare<1>, list_blocks(args.n), 1, kListThreads, stream, args, largest);
+  } else {
+    launch(prepare<kBatch>, list_blocks(args.n / kBatch), 1, kListThreads, stream, args, largest);
+  }
 }
 
-void launch_count_images(const PeriodicArgs& args, cudaStream_t stream) {
-  launch(count_images, list_blocks(args.n), 1, kListThreads, stream, args);
+void launch_make_contacts(const SpheresInCells& in, const SpherePair* pairs, std::size_t n,
+                          SphereContact* contacts, cudaStream_t stream) {
+  if (n == 0) return;
+  launch(make_contacts, list_blocks(n), 1, kListThreads, stream, in, pairs, n, contacts);
 }
 
-void launch_append_images(const PeriodicArgs& args, SphereInstance* spheres, cudaStream_t stream) {
-  launch(append_images, list_blocks(args.n), 1, kListThreads, stream, args, spheres);
-}
-
-template <class Item>
-void launch_mark_kept(const PeriodicArgs& args, Item* items, std::size_t n, std::uint32_t* kept,
-                      cudaStream_t stream) {
-  launch(mark_kept<Item>, list_blocks(n), 1, kListThreads, stream, args, items, n, kept);
-}
-
-template <class Item>
-void launch_place_kept(const PeriodicArgs& args, const Item* items, std::size_t n,
-                       const std::uint32_t* kept, const unsigned long long* places, Item* out,
-                       ImageShift* shifts, ContactCount* count, cudaStream_t stream) {
-  launch(place_kept<Item>, list_blocks(n), 1, kListThreads, stream, args, items, n, kept, places,
-         out, shifts, count);
-}
-
-template <class Item>
-void launch_write_shifts(const FoundItems<Item>& found, const FoundItems<Item>& half,
-                         const ImageShift* half_shifts, std::int32_t* shifts, std::size_t capacity,
-                         cudaStream_t stream) {
+template <class Pairs>
+void launch_write_shifts(const SpheresInCells& in, const Pairs& found, std::int32_t* shifts,
+                         std::size_t capacity, cudaStream_t stream) {
   if (capacity == 0) return;
-  launch(write_shifts<Item>, list_blocks(capacity), 1, kListThreads, stream, found, half,
-         half_shifts, shifts, capacity);
+  if (capacity <= kFewForBatches) {
+    launch(write_shifts<Pairs, 1>, list_blocks(capacity), 1, kListThreads, stream, in, found,
+           shifts, capacity);
+  } else {
+    launch(write_shifts<Pairs, kBatch>, list_blocks(capacity / kBatch), 1, kListThreads, stream, in,
+           found, shifts, capacity);
+  }
 }
 
-#define JFPX_INSTANTIATE(Item)                                                            \
-  template void launch_mark_kept(const PeriodicArgs&, Item*, std::size_t, std::uint32_t*, \
-                                 cudaStream_t);                                           \
-  template void launch_place_kept(const PeriodicArgs&, const Item*, std::size_t,          \
-                                  const std::uint32_t*, const unsigned long long*, Item*, \
-                                  ImageShift*, ContactCount*, cudaStream_t);              \
-  template void launch_write_shifts(const FoundItems<Item>&, const FoundItems<Item>&,     \
-                                    const ImageShift*, std::int32_t*, std::size_t, cudaStream_t);
-JFPX_INSTANTIATE(SpherePair)
-JFPX_INSTANTIATE(SphereContact)
+#define JFPX_INSTANTIATE(Pairs)                                                         \
+  template void launch_write_shifts(const SpheresInCells&, const Pairs&, std::int32_t*, \
+                                    std::size_t, cudaStream_t);
+JFPX_INSTANTIATE(FoundItems<SpherePair>)
+JFPX_INSTANTIATE(FoundItems<SphereContact>)
+JFPX_INSTANTIATE(PairRows<std::int32_t>)
+JFPX_INSTANTIATE(PairRows<std::int64_t>)
 #undef JFPX_INSTANTIATE
 
 }  // namespace cuda

@@ -1,120 +1,121 @@
-/// The stages of a search in a periodic cell.
+/// Memory of a search in a periodic cell on the device.
 #include "src/sphere_collider/cuda/periodic_search.hpp"
 
-#include "src/sphere_collider/cuda/scan.hpp"
 #include "src/sphere_collider/periodic_input.hpp"
 
 #include <algorithm>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
+namespace {
 
-void PeriodicSearch::enqueue_scan(const std::uint32_t* values, unsigned long long* sums,
-                                  std::size_t n) {
-  const std::size_t bytes = scan_scratch_bytes(n);
-  scratch_.reserve_geometric(pool_, stream_, bytes, "scratch of a scan");
-  exclusive_scan(values, sums, n, scratch_.data(), bytes, stream_);
-}
-
-bool PeriodicSearch::count(const SphereInstance* spheres, std::size_t n) {
-  given_.reserve_geometric(pool_, stream_, n, "spheres");
-  reduced_.reserve_geometric(pool_, stream_, n, "reduced spheres");
-  counts_.reserve_geometric(pool_, stream_, n + 1, "numbers of images");
-  begins_.reserve_geometric(pool_, stream_, n + 1, "sums of numbers of images");
-  state_.reserve(pool_, stream_, 1, "states of searches");
-  totals_.reserve(1, "numbers of images");
-  args_.n = static_cast<std::uint32_t>(n);
-  args_.given = given_.data();
-  args_.reduced = reduced_.data();
-  args_.counts = counts_.data();
-  args_.begins = begins_.data();
-  args_.state = state_.data();
-  JFPX_CUDA_TRY(cudaMemsetAsync(state_.data(), 0, sizeof(PeriodicState), stream_));
-  launch_reduce(args_, spheres, stream_);
-  launch_count_images(args_, stream_);
-  enqueue_scan(counts_.data(), begins_.data(), n + 1);
-  Totals& totals = *totals_.data();
-  JFPX_CUDA_TRY(cudaMemcpyAsync(&totals.state, state_.data(), sizeof totals.state,
-                                cudaMemcpyDeviceToHost, stream_));
-  JFPX_CUDA_TRY(cudaMemcpyAsync(&totals.images, begins_.data() + n, sizeof totals.images,
-                                cudaMemcpyDeviceToHost, stream_));
-  JFPX_CUDA_TRY(cudaStreamSynchronize(stream_));
-  return totals.state.has_bad != 0;
-}
-
-std::size_t PeriodicSearch::reserve_images() {
-  images_.reserve_geometric(pool_, stream_, totals_.data()->images, "images");
-  args_.images = images_.data();
-  return totals_.data()->images;
-}
-
-std::vector<SphereInstance> PeriodicSearch::download(const SphereInstance* spheres,
-                                                     std::size_t n) const {
+std::vector<SphereInstance> download(const SphereInstance* spheres, std::size_t n,
+                                     cudaStream_t stream) {
   std::vector<SphereInstance> copy(n);
   JFPX_CUDA_TRY(
-      cudaMemcpyAsync(copy.data(), spheres, n * sizeof copy[0], cudaMemcpyDeviceToHost, stream_));
-  JFPX_CUDA_TRY(cudaStreamSynchronize(stream_));
+      cudaMemcpyAsync(copy.data(), spheres, n * sizeof copy[0], cudaMemcpyDeviceToHost, stream));
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream));
   return copy;
 }
 
-std::size_t PeriodicSearch::count_images(const SphereInstance* spheres, std::size_t n,
-                                         const PeriodicCell& cell) {
-  args_ = {};
-  args_.cell = cell;
-  if (count(spheres, n)) {
-    const std::vector<SphereInstance> copy = download(spheres, n);
-    detail::check_spheres(copy);
-    detail::check_in_cell(cell, copy);
+}  // namespace
+
+std::uint32_t PeriodicSearch::capacity_for(std::size_t n) const {
+  constexpr std::uint64_t kMostOfSphere = detail::kShifts - 1;
+  const std::uint64_t usual = n / 4 + 1024, expected = expected_images_ + expected_images_ / 8 + 64;
+  const std::uint64_t most = std::min<std::uint64_t>(kMostOfSphere * n, kMaxSpheres - n);
+  return static_cast<std::uint32_t>(std::min(std::max(usual, expected), most));
+}
+
+bool PeriodicSearch::fits(std::size_t n) const {
+  const std::size_t images = capacity_for(n);
+  return state_.capacity() != 0 && n + images <= reduced_.capacity() && n <= points_.capacity() &&
+         images <= images_.capacity();
+}
+
+void PeriodicSearch::reserve(std::size_t n) {
+  const std::size_t images = capacity_for(n);
+  reduced_.reserve_geometric(pool_, stream_, n + images, "reduced spheres and images");
+  points_.reserve_geometric(pool_, stream_, n, "centres");
+  images_.reserve_geometric(pool_, stream_, images, "images");
+  known_.reserve(pool_, stream_, 1, "cells");
+  if (state_.reserve(pool_, stream_, 1, "states of searches")) is_cleared_ = false;
+}
+
+void PeriodicSearch::enqueue(const SphereArrays& first, const SphereArrays& second,
+                             SphereInstance* given, const PeriodicCell& cell, cudaStream_t stream) {
+  const std::size_t n = first.count + second.count;
+  signal_.clear();
+  args_ = {.cell = cell,
+           .errors = detail::errors_in(cell),
+           .first = first,
+           .second = second,
+           .n = static_cast<std::uint32_t>(n),
+           .given = given,
+           .reduced = reduced_.data(),
+           .points = points_.data(),
+           .images = images_.data(),
+           .capacity = capacity_for(n),
+           .known = known_.data(),
+           .state = state_.data(),
+           .signal = signal_.word()};
+  if (!is_cleared_) {  // at the start, and after a search that has failed
+    JFPX_CUDA_TRY(cudaMemsetAsync(state_.data(), 0, sizeof(PeriodicState), stream));
   }
-  detail::check_in_cell(cell, {});  // if there are no spheres
-  return reserve_images();
+  is_cleared_ = false;
+  launch_prepare(args_, stream);
+  is_cleared_ = true;
 }
 
-std::size_t PeriodicSearch::count_images(const SphereInstance* spheres,
-                                         std::span<const PeriodicCell> cells,
-                                         std::span<const std::uint64_t> offsets,
-                                         const std::uint64_t* device_offsets) {
-  cells_.reserve_geometric(pool_, stream_, cells.size(), "periodic cells");
-  JFPX_CUDA_TRY(cudaMemcpyAsync(cells_.data(), cells.data(), cells.size_bytes(),
-                                cudaMemcpyHostToDevice, stream_));
-  args_ = {};
-  args_.cells = cells_.data();
-  args_.offsets = device_offsets;
-  args_.systems = static_cast<std::uint32_t>(cells.size());
-  const std::size_t n = offsets.back();
-  const bool has_bad =
-      count(spheres, n) || !std::all_of(cells.begin(), cells.end(), [](auto& cell) {
-        return detail::fits(cell, 0);  // also those of empty systems
-      });
-  if (has_bad) {
-    const std::vector<SphereInstance> copy = download(spheres, n);
-    detail::check_spheres(copy);
-    detail::check_in_cells(cells, copy, offsets);
-  }
-  return reserve_images();
+PeriodicSearch::Images PeriodicSearch::wait(cudaStream_t stream) {
+  const unsigned long long word = signal_.wait(stream);
+  const Images images{word >> kSignalBits, (word & kSignalIsValid) != 0,
+                      (word & kSignalIsComplete) != 0};
+  if (images.is_valid) expected_images_ = images.count;
+  return images;
 }
 
-void PeriodicSearch::append_images(SphereInstance* spheres) {
-  launch_append_images(args_, spheres, stream_);
+SphereInput PeriodicSearch::input_on_device() const {
+  // Where the sum of the radii of reduced spheres exceeds their distance by `least`, apart from
+  // roundings, the given spheres touch: see doubt_of().
+  const Real least = 2 * args_.errors.margin + args_.errors.distance + detail::kNegligible;
+  return {.spheres = reduced_.data(),
+          .n = args_.n + args_.capacity,
+          .periodic = {.known = known_.data(),
+                       .is_one_launch = true,
+                       .spheres = args_.n,
+                       .images = images_.data(),
+                       .slack = Real(2.1) * least,
+                       .relative_slack = 40 * kEpsilon}};
 }
 
-template <class Item>
-void PeriodicSearch::keep_nearest(Item* items, std::size_t found, DeviceBuffer<Item>* out,
-                                  ContactCount* count) {
-  kept_.reserve_geometric(pool_, stream_, found + 1, "marks of contacts");
-  places_.reserve_geometric(pool_, stream_, found + 1, "places of contacts");
-  out->reserve_geometric(pool_, stream_, found, "contacts");
-  shifts_.reserve_geometric(pool_, stream_, found, "shifts");
-  launch_mark_kept(args_, items, found, kept_.data(), stream_);
-  enqueue_scan(kept_.data(), places_.data(), found + 1);
-  launch_place_kept(args_, items, found, kept_.data(), places_.data(), out->data(), shifts_.data(),
-                    count, stream_);
+SphereInput PeriodicSearch::input() const {
+  SphereInput result = input_on_device();
+  result.n = args_.n + static_cast<std::uint32_t>(expected_images_);
+  result.periodic.is_one_launch = false;
+  return result;
 }
-template void PeriodicSearch::keep_nearest(SpherePair*, std::size_t, DeviceBuffer<SpherePair>*,
-                                           ContactCount*);
-template void PeriodicSearch::keep_nearest(SphereContact*, std::size_t,
-                                           DeviceBuffer<SphereContact>*, ContactCount*);
+
+SpheresInCells PeriodicSearch::spheres() const {
+  return {
+      .spheres = args_.given, .cell = args_.cell, .points = points_.data(), .known = known_.data()};
+}
+
+void check_periodic(const SphereInstance* spheres, std::size_t n, const PeriodicCell& cell,
+                    cudaStream_t stream) {
+  const std::vector<SphereInstance> copy = download(spheres, n, stream);
+  detail::check_spheres(copy);
+  detail::check_in_cell(cell, copy);
+}
+
+void check_periodic(const SphereInstance* spheres, std::span<const PeriodicCell> cells,
+                    std::span<const std::uint64_t> offsets, cudaStream_t stream) {
+  const std::vector<SphereInstance> copy = download(spheres, offsets.back(), stream);
+  detail::check_spheres(copy);
+  detail::check_in_cells(cells, copy, offsets);
+}
 
 }  // namespace cuda
 }  // namespace JFPX_ABI

@@ -1,71 +1,70 @@
-/// State of a search in a periodic cell on the device, around a search among spheres and images.
+/// Memory of a search in a periodic cell on the device, which is one among spheres and images.
 #pragma once
 
 #include "src/base/cuda/device_buffer.hpp"
 #include "src/sphere_collider/cuda/periodic_images.hpp"
+#include "src/sphere_collider/cuda/search_signal.hpp"
 
 #include <span>
-#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Enqueues its work on one stream. Keeps the shifts of the last search.
+/// Memory is allocated and freed in the order of the stream of the constructor; the caller orders
+/// that stream and those of the searches.
 class PeriodicSearch {
  public:
   /// Allocates from `pool`; both outlive the object.
   PeriodicSearch(const MemoryPool& pool, cudaStream_t stream) : pool_(pool), stream_(stream) {}
 
-  /// Begins a search among `n` spheres in device memory, and waits for the number of their images,
-  /// which is returned.
-  /// @throws InvalidArgument as find_periodic_contacts(), OutOfMemory, DeviceError
-  std::size_t count_images(const SphereInstance* spheres, std::size_t n, const PeriodicCell& cell);
-  /// The same within systems, each of which has a cell.
-  /// @param offsets in host memory
-  /// @param device_offsets the same in device memory
-  std::size_t count_images(const SphereInstance* spheres, std::span<const PeriodicCell> cells,
-                           std::span<const std::uint64_t> offsets,
-                           const std::uint64_t* device_offsets);
-  /// Enqueues the n reduced spheres and the images that were counted.
-  void append_images(SphereInstance* spheres);
-  /// Enqueues the pairs of nearest images, and their number.
-  /// @param items [found] sorted pairs among the reduced spheres and their images; changes
-  template <class Item>
-  void keep_nearest(Item* items, std::size_t found, DeviceBuffer<Item>* out, ContactCount* count);
-
-  /// [n + 1]: the images of sphere i are from n + image_begins[i] to n + image_begins[i + 1].
-  const unsigned long long* image_begins() const noexcept { return begins_.data(); }
-  /// Shifts of the items that keep_nearest() has written.
-  const ImageShift* shifts() const noexcept { return shifts_.data(); }
+  /// Number of images of n spheres for which the next search has room: about as many as in the last
+  /// one, or as are usual.
+  std::uint32_t capacity_for(std::size_t n) const;
+  /// Whether memory is reserved for n spheres and the capacity.
+  bool fits(std::size_t n) const;
+  void reserve(std::size_t n);
+  /// Enqueues the given and the reduced spheres, the images, and the signal of their number.
+  /// @param given [first.count + second.count] in device memory
+  /// @pre fits()
+  void enqueue(const SphereArrays& first, const SphereArrays& second, SphereInstance* given,
+               const PeriodicCell& cell, cudaStream_t stream);
+  /// The spheres, and all images for which there is room. Their number is known on the device.
+  SphereInput input_on_device() const;
+  /// Number of images, and whether there was room for all.
+  struct Images {
+    std::uint64_t count;
+    bool is_valid, is_complete;
+  };
+  /// Waits for the signal. The number of images becomes the expected one.
+  Images wait(cudaStream_t stream);
+  /// The spheres and images after wait().
+  SphereInput input() const;
+  std::size_t number_of_spheres() const { return args_.n; }
+  /// The spheres for the output.
+  SpheresInCells spheres() const;
 
  private:
-  struct Totals {
-    PeriodicState state;
-    unsigned long long images;
-  };
-
-  void enqueue_scan(const std::uint32_t* values, unsigned long long* sums, std::size_t n);
-  /// Counts the images, and waits.
-  /// @returns whether a sphere is bad
-  bool count(const SphereInstance* spheres, std::size_t n);
-  std::size_t reserve_images();
-  std::vector<SphereInstance> download(const SphereInstance* spheres, std::size_t n) const;
-
   const MemoryPool& pool_;
   cudaStream_t stream_;
   PeriodicArgs args_{};
-  DeviceBuffer<DisplacedSphere> given_;
+  bool is_cleared_ = false;  // the state
+  std::uint64_t expected_images_ = 0;
+  SearchSignal signal_;
   DeviceBuffer<SphereInstance> reduced_;
-  DeviceBuffer<PeriodicCell> cells_;
-  DeviceBuffer<ImageShift> shifts_;
-  DeviceBuffer<std::uint32_t> counts_, kept_;
-  DeviceBuffer<unsigned long long> begins_, places_;
-  DeviceBuffer<PeriodicImage> images_;
+  DeviceBuffer<CellPoint> points_;
+  DeviceBuffer<std::uint32_t> images_;
   DeviceBuffer<PeriodicState> state_;
-  PinnedBuffer<Totals> totals_;
-  DeviceBuffer<unsigned char> scratch_;
+  DeviceBuffer<PeriodicSpheres> known_;
 };
+
+/// Checks spheres that a search has found to be invalid, as the functions on the host do.
+/// @param spheres [n] in device memory
+/// @throws InvalidArgument if one is
+void check_periodic(const SphereInstance* spheres, std::size_t n, const PeriodicCell& cell,
+                    cudaStream_t stream);
+void check_periodic(const SphereInstance* spheres, std::span<const PeriodicCell> cells,
+                    std::span<const std::uint64_t> offsets, cudaStream_t stream);
 
 }  // namespace cuda
 }  // namespace JFPX_ABI

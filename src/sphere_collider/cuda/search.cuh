@@ -25,15 +25,17 @@ __device__ inline SphereInstance load_sphere(const SphereInstance* p) {
   return s;
 }
 
-/// Loads sphere `i` of the input through the read-only cache.
-__device__ inline SphereInstance load_sphere(const SphereInput& input, std::uint64_t i) {
-  if (input.spheres != nullptr) return load_sphere(input.spheres + i);
-  const SphereArrays& arrays = input.arrays;
+/// Loads sphere `i` of arrays through the read-only cache.
+__device__ inline SphereInstance load_from(const SphereArrays& arrays, std::uint64_t i) {
   const auto row = static_cast<std::ptrdiff_t>(i);
   const Real* const p = arrays.positions + row * arrays.row_stride;
   const Real radius =
       arrays.radii == nullptr ? arrays.radius : __ldg(arrays.radii + row * arrays.radius_stride);
   return {{__ldg(p), __ldg(p + arrays.column_stride), __ldg(p + 2 * arrays.column_stride)}, radius};
+}
+/// Loads sphere `i` of the input through the read-only cache.
+__device__ inline SphereInstance load_sphere(const SphereInput& input, std::uint64_t i) {
+  return input.spheres != nullptr ? load_sphere(input.spheres + i) : load_from(input.arrays, i);
 }
 
 __device__ inline bool is_valid(const SphereInstance& s) {
@@ -73,14 +75,31 @@ __device__ inline void write_pair(const SearchOutput& output, unsigned long long
 
 /// Writes the contact of the touching pair a < b to index `at` of the output.
 __device__ inline void write_contact(const SearchOutput& output, unsigned long long at,
+                                     std::uint32_t a, std::uint32_t b, const PairResult& r) {
+  if (output.contacts == nullptr) {
+    write_pair(output, at, a, b);
+  } else {
+    output.contacts[at] = {a, b, r.normal, r.distance};
+  }
+}
+/// The same from the spheres.
+__device__ inline void write_contact(const SearchOutput& output, unsigned long long at,
                                      std::uint32_t a, std::uint32_t b, const SphereInstance& sa,
                                      const SphereInstance& sb) {
   if (output.contacts == nullptr) {
     write_pair(output, at, a, b);
-    return;
+  } else {
+    write_contact(output, at, a, b, detail::test_sphere_pair(sa, sb));
   }
-  const PairResult r = detail::test_sphere_pair(sa, sb);
-  output.contacts[at] = {a, b, r.normal, r.distance};
+}
+
+/// Writes a word that the host polls; see SearchSignal.
+__device__ inline void write_signal(unsigned long long* signal, unsigned long long number,
+                                    bool valid, bool complete) {
+  const unsigned long long word = (valid ? number : 0) << kSignalBits |
+                                  (valid ? kSignalIsValid : 0) |
+                                  (valid && complete ? kSignalIsComplete : 0);
+  asm volatile("st.relaxed.sys.global.u64 [%0], %1;" ::"l"(signal), "l"(word) : "memory");
 }
 
 /// Writes the ContactCount of a search, with 0 contacts if a sphere is invalid. Call from one
@@ -89,11 +108,7 @@ __device__ inline void write_count(const SearchOutput& output, unsigned long lon
                                    std::uint32_t invalid, bool complete) {
   const bool valid = invalid == kNoSphere;
   *output.count = {valid ? contacts : 0, invalid, valid && complete ? 1u : 0u};
-  if (output.signal == nullptr) return;
-  const unsigned long long signal = (valid ? contacts : 0) << kSignalBits |
-                                    (valid ? kSignalIsValid : 0) |
-                                    (valid && complete ? kSignalIsComplete : 0);
-  asm volatile("st.relaxed.sys.global.u64 [%0], %1;" ::"l"(output.signal), "l"(signal) : "memory");
+  if (output.signal != nullptr) write_signal(output.signal, contacts, valid, complete);
 }
 
 /// A warp writes the contacts of row `a`, given as 32 words of a bit mask, one word per lane: lane

@@ -36,6 +36,7 @@ struct alignas(16) SearchState {
   std::uint32_t levels;              ///< bit l is set if there are spheres on grid level l
   std::uint32_t long_rows;           ///< entries of GridArgs::Rows::long_rows
   std::uint32_t very_long_rows;      ///< entries of GridArgs::Rows::very_long_rows
+  std::uint32_t rows_again;          ///< entries of Table::ranks: see list_row_again()
   std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
   std::uint32_t blocks_sampled;      ///< blocks that have finished their part of the sample
   std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
@@ -45,12 +46,45 @@ struct alignas(16) SearchState {
   std::uint32_t same_cell[32];           ///< pairs of sampled spheres in one cell, by level
 };
 
+/// What a search in a periodic cell has found about its spheres.
+struct PeriodicSpheres {
+  const SphereInstance* given;  ///< as the user gave them
+  PeriodicCell cell;
+  std::uint32_t n;       ///< number of reduced spheres and images; 0: some are invalid or missing
+  bool may_touch_twice;  ///< whether two spheres may touch through two images
+};
+/// Search in a periodic cell: the first spheres of the input are reduced to the cell
+/// (periodic_cell.hpp), and the others are images of these. Pairs are tested as given.
+struct PeriodicInput {
+  const PeriodicSpheres* known = nullptr;  ///< in device memory; null: not in a cell
+  /// The search is one launch, and the number of spheres is a limit; the exact one is `known->n`.
+  /// The result is not valid if that is 0, or if the spheres need several launches: several levels
+  /// of the grid, or a hashed table of cells.
+  bool is_one_launch = false;
+  std::uint32_t spheres = ~0u;            ///< number of reduced spheres
+  const std::uint32_t* images = nullptr;  ///< [n - spheres] image_id() of the others
+  Real slack = 0, relative_slack = 0;     ///< see doubt_of()
+};
+
 /// Spheres of a search, in device memory.
 struct SphereInput {
   const SphereInstance* spheres = nullptr;  ///< null: the spheres are in `arrays`
   std::uint32_t n = 0;
   SphereArrays arrays = {};
+  PeriodicInput periodic = {};
+  /// Number of spheres that have a row of contacts: images have none.
+  JFPX_HD std::uint32_t rows() const { return n < periodic.spheres ? n : periodic.spheres; }
 };
+
+/// The index of a sphere, or that of the sphere that an image is of, with the highest bit.
+inline constexpr std::uint32_t kImageBit = std::uint32_t{1} << 31;
+static_assert(kMaxSpheres <= kImageBit);
+JFPX_HD inline std::uint32_t image_id(std::uint32_t sphere) { return sphere | kImageBit; }
+JFPX_HD inline bool is_image(std::uint32_t id) { return (id & kImageBit) != 0; }
+template <bool kPeriodic>
+JFPX_HD std::uint32_t sphere_of(std::uint32_t id) {
+  return kPeriodic ? id & ~kImageBit : id;
+}
 
 /// Pairs as two rows of indices: all a's, then all b's.
 struct IndexRows {

@@ -1,5 +1,6 @@
 /// Search within systems: a warp tests a sphere against the later ones of its system, in order,
 /// once to count and once to write.
+#include "src/sphere_collider/cuda/periodic_pairs.cuh"
 #include "src/sphere_collider/cuda/search.cuh"
 #include "src/sphere_collider/cuda/systems.hpp"
 
@@ -21,33 +22,27 @@ unsigned blocks_for(std::uint32_t n) {
 __device__ std::uint32_t first_sphere() { return (blockIdx.x * kThreads + threadIdx.x) / 32; }
 __device__ std::uint32_t sphere_stride() { return gridDim.x * (kThreads / 32); }
 
-/// Calls visit(touching lanes, b, sphere b) for each vector of the spheres from `begin` to `end`,
-/// whether or not this lane has one.
+/// Calls visit(touching lanes, b, result of the test) for each vector of the later spheres of the
+/// system of `a`, whether or not this lane has one.
 template <typename Visit>
-__device__ void visit_range(const SystemsArgs& args, const SphereInstance& sa, std::uint32_t begin,
-                            std::uint32_t end, Visit visit) {
-  for (std::uint32_t first = begin; first < end; first += 32) {
+__device__ void visit_later(const SystemsArgs& args, std::uint32_t a, const SphereInstance& sa,
+                            std::uint32_t system, Visit visit) {
+  const auto end = static_cast<std::uint32_t>(args.offsets[system + 1]);
+  for (std::uint32_t first = a + 1; first < end; first += 32) {
     const std::uint32_t b = first + lane_id();
-    SphereInstance sb{};
-    bool touch = false;
+    PairResult found{};
     if (b < end) {
-      sb = load_sphere(args.spheres + b);
-      touch = detail::test_sphere_pair(sa, sb).touching != 0;
+      const SphereInstance sb = load_sphere(args.spheres + b);
+      found = args.cells != nullptr ? detail::touch_in_cell(sa, sb, args.cells[system]).pair
+                                    : detail::test_sphere_pair(sa, sb);
     }
-    visit(__ballot_sync(kFullWarp, touch), b, sb);
+    visit(__ballot_sync(kFullWarp, found.touching != 0), b, found);
   }
 }
 
-/// The same for the later spheres of the system of `a`, and for their images.
-template <typename Visit>
-__device__ void visit_later(const SystemsArgs& args, std::uint32_t a, const SphereInstance& sa,
-                            Visit visit) {
-  const std::uint32_t system = system_of(args.offsets, args.systems, a);
-  const auto end = static_cast<std::uint32_t>(args.offsets[system + 1]);
-  visit_range(args, sa, a + 1, end, visit);
-  if (args.image_begins == nullptr) return;
-  visit_range(args, sa, args.n + static_cast<std::uint32_t>(args.image_begins[a + 1]),
-              args.n + static_cast<std::uint32_t>(args.image_begins[end]), visit);
+__device__ bool is_valid_in_system(const SystemsArgs& args, const SphereInstance& s,
+                                   std::uint32_t system) {
+  return args.cells != nullptr ? is_valid_in(args.cells[system], s) : is_valid(s);
 }
 
 __global__ void __launch_bounds__(kThreads) count_in_systems(SystemsArgs args) {
@@ -55,13 +50,14 @@ __global__ void __launch_bounds__(kThreads) count_in_systems(SystemsArgs args) {
   if (blockIdx.x == 0 && threadIdx.x == 0) args.counts[args.n] = 0;
   for (std::uint32_t a = first_sphere(); a < args.n; a += sphere_stride()) {
     const SphereInstance sa = load_sphere(args.spheres + a);
+    const std::uint32_t system = system_of(args.offsets, args.systems, a);
     std::uint32_t count = 0;
-    visit_later(args, a, sa, [&](unsigned touching, std::uint32_t, const SphereInstance&) {
+    visit_later(args, a, sa, system, [&](unsigned touching, std::uint32_t, const PairResult&) {
       count += static_cast<unsigned>(__popc(touching));
     });
     if (lane_id() != 0) continue;
     args.counts[a] = count;
-    if (!is_valid(sa)) report_invalid(args.state, a);
+    if (!is_valid_in_system(args, sa, system)) report_invalid(args.state, a);
   }
 }
 
@@ -76,13 +72,14 @@ __global__ void __launch_bounds__(kThreads) emit_in_systems(SystemsArgs args, Se
     unsigned long long at = args.sums[a];
     if (at == args.sums[a + 1]) continue;
     const SphereInstance sa = load_sphere(args.spheres + a);
-    visit_later(args, a, sa, [&](unsigned touching, std::uint32_t b, const SphereInstance& sb) {
+    const auto write = [&](unsigned touching, std::uint32_t b, const PairResult& found) {
       if ((touching >> lane_id() & 1u) != 0) {
         const auto rank = static_cast<unsigned>(__popc(touching & lanes_below()));
-        write_contact(output, at + rank, a, b, sa, sb);
+        write_contact(output, at + rank, a, b, found);
       }
       at += static_cast<unsigned>(__popc(touching));
-    });
+    };
+    visit_later(args, a, sa, system_of(args.offsets, args.systems, a), write);
   }
 }
 

@@ -16,9 +16,7 @@ struct SystemsArgs {
   const std::uint64_t*
       offsets;  ///< [systems + 1]: system i has spheres offsets[i] to offsets[i + 1]
   std::uint32_t systems;
-  /// [n + 1] or null: the images of sphere i are from n + image_begins[i] to n + image_begins[i +
-  /// 1].
-  const unsigned long long* image_begins;
+  const PeriodicCell* cells;       ///< [systems], or null: systems are not periodic
   std::uint32_t* counts;           ///< [n + 1] row lengths, and a 0
   const unsigned long long* sums;  ///< [n + 1] exclusive scan of `counts`
   SearchState* state;              ///< zero at the start of a search
@@ -38,7 +36,7 @@ JFPX_HD inline std::uint32_t system_of(const std::uint64_t* offsets, std::uint32
   return low;
 }
 
-/// Enqueues the count of the contacts of each sphere with later ones and with their images.
+/// Enqueues the count of the contacts of each sphere with later ones.
 void launch_count_in_systems(const SystemsArgs& args, cudaStream_t stream);
 /// Enqueues the output of the contacts, sorted by (a, b).
 void launch_emit_in_systems(const SystemsArgs& args, const SearchOutput& output,

@@ -120,24 +120,153 @@ TEST_F(Cuda, FewArraysInALargePeriodicCellHaveTheContactsOfTheHost) {
   }
 }
 
+/// Random spheres of a cell, with up to `ratio` between radii, some of which have left it, and
+/// about that number of neighbors of each.
+Spheres gas_with(const PeriodicCell& cell, std::size_t n, double neighbors, Real ratio,
+                 Random& random) {
+  const double volume = static_cast<double>(cell.lengths.x) * static_cast<double>(cell.lengths.y) *
+                        static_cast<double>(cell.lengths.z);
+  const double cutoff = std::cbrt(neighbors * volume / static_cast<double>(n) / 4.19);
+  Spheres spheres(n);
+  for (SphereInstance& s : spheres) {
+    for (int k = 0; k < 3; ++k) {
+      const auto cells = static_cast<Real>(random.below(4)) - 2;
+      s.centre[k] = (random.uniform(0, 1) + cells) * cell.lengths[k];
+    }
+    s.radius = static_cast<Real>(cutoff) / 2 * (ratio > 1 ? random.uniform(1 / ratio, 1) : 1);
+  }
+  return spheres;
+}
+
+/// @param fewest contacts that the test expects
+void expect_contacts_of_host(ArrayCollider& collider, const Spheres& spheres,
+                             const PeriodicCell& cell, std::size_t fewest) {
+  const OwnedStream stream(0);
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const auto expected = find_periodic_contacts(*cpu, spheres, cell);
+  ASSERT_GT(expected.size(), fewest);
+  const DeviceSpheres arrays(spheres);
+  ASSERT_EQ(
+      collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
+      expected.size())
+      << seed_note();
+  EXPECT_TRUE(periodic_of(collider, expected.size(), stream.get()) == expected) << seed_note();
+}
+
+struct PeriodicGas {
+  std::size_t n;
+  double neighbors;
+  Real ratio;
+};
+
+/// All variants of the grid search: direct, in one launch and in several, crowded or not, on one
+/// level or several, with rows that are too long to be staged.
 TEST_F(Cuda, ArraysInAPeriodicCellUseTheGridWithTheSameBits) {
   Random random(base_seed());
   const OwnedStream stream(0);
   ArrayCollider collider;
   const auto cpu = make_sphere_collider({.backend = Backend::cpu});
-  for (const Real length : {Real(60), Real(300)}) {  // many and few contacts
-    const PeriodicCell cell{{length, length, length}};
-    Spheres spheres = gas_in(cell, 60'000, 1, random);
-    for (SphereInstance& s : spheres) {
-      for (int k = 0; k < 3; ++k) s.centre[k] += random.uniform(0, 40);  // off the lattice
-    }
+  const PeriodicCell cell{{60, 70, Real(50.5)}, {true, true, random.below(2) == 0}};
+  for (const auto& [n, neighbors, ratio] : {PeriodicGas{5'000, 3, 1},
+                                            {20'000, 25, Real(1.5)},
+                                            {60'000, 3, 1},
+                                            {60'000, 30, 1},
+                                            {60'000, 90, Real(1.4)},
+                                            {60'000, 120, 1},
+                                            {60'000, 200, 1},
+                                            {60'000, 30, 30},
+                                            {270'000, 3, 1},
+                                            {270'000, 30, 1},
+                                            {270'000, 8, Real(1.9)},
+                                            {270'000, 20, 12},
+                                            {265'000, 75, 1}}) {
+    const Spheres spheres = gas_with(cell, n, neighbors, ratio, random);
+    SCOPED_TRACE(std::to_string(n) + " spheres, " + std::to_string(neighbors) + " neighbors");
+    expect_contacts_of_host(collider, spheres, cell, n / 20);
+    // Searches with and without a cell share memory.
+    const auto open = cpu->find_contacts(spheres);
     const DeviceSpheres arrays(spheres);
-    const auto expected = find_periodic_contacts(*cpu, spheres, cell);
-    ASSERT_EQ(
-        collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
-        expected.size())
+    ASSERT_EQ(collider.find(arrays.arrays(), ArrayResult::contacts, false, stream.get()),
+              open.size());
+    EXPECT_TRUE(
+        std::ranges::equal(contacts_of<std::int32_t>(collider, open.size(), stream.get()), open))
         << seed_note();
-    EXPECT_TRUE(periodic_of(collider, expected.size(), stream.get()) == expected) << seed_note();
+  }
+}
+
+/// Distances that equal the sum of the radii, which reduced spheres and images cannot decide.
+TEST_F(Cuda, ArraysOfALatticeInAPeriodicCellTouchExactly) {
+  ArrayCollider collider;
+  for (const int side : {12, 24, 66}) {
+    for (const Real radius : {Real(0.5), Real(1)}) {
+      const auto length = static_cast<Real>(side);
+      Spheres spheres;
+      for (int i = 0; i < side * side * side; ++i) {
+        const Vec3 at{static_cast<Real>(i % side), static_cast<Real>(i / side % side),
+                      static_cast<Real>(i / side / side)};
+        spheres.push_back({at - Vec3{length, 3, 2 * length}, radius});
+      }
+      SCOPED_TRACE(std::to_string(side) + "^3 spheres of radius " + std::to_string(radius));
+      expect_contacts_of_host(collider, spheres, {{length, length, length}}, spheres.size());
+    }
+  }
+}
+
+/// Cells that are much larger than what is in them, and one that does not repeat, where radii may
+/// be so large that their squares overflow.
+TEST_F(Cuda, ArraysInAnEmptyOrOpenCellHaveTheContactsOfTheHost) {
+  Random random(base_seed());
+  ArrayCollider collider;
+  for (int k = 0; k < 3; ++k) {
+    const PeriodicCell box{{30, 30, 30}};
+    const Spheres few = gas_with(box, 20'000, 4, 1, random);
+    Spheres slab = few;
+    for (SphereInstance& s : slab) s.centre.z += s.centre.z < 0 ? 900 : 0;
+    expect_contacts_of_host(collider, slab, {{1000, 30, 1000}}, 1000);
+  }
+  Spheres huge(25'001);
+  for (std::size_t i = 0; i < huge.size(); ++i) {
+    const auto group = static_cast<Real>(i / 4);
+    huge[i] = {{group * Real(2e20), 0, 0}, Real(1e20)};
+  }
+  expect_contacts_of_host(collider, huge, {{1, 1, 1}, {false, false, false}}, 10'000);
+}
+
+template <class Index>
+void expect_pairs_in_arrays(ArrayCollider& collider, const Spheres& spheres,
+                            const PeriodicCell& cell,
+                            const std::vector<PeriodicContact>& expected) {
+  const OwnedStream stream(0);
+  const DeviceSpheres arrays(spheres);
+  const std::size_t e = expected.size();
+  const DeviceArray<Index> indices(2 * e);
+  const DeviceArray<std::int32_t> shifts(3 * e);
+  for (const std::size_t capacity : {e / 2, e}) {
+    ASSERT_EQ(collider.find_periodic_pairs(arrays.arrays(), cell, indices.data(), shifts.data(),
+                                           capacity, stream.get()),
+              e);
+  }
+  JFPX_CUDA_TRY(cudaStreamSynchronize(stream.get()));
+  const auto found = indices.download();
+  const auto found_shifts = shifts.download();
+  std::vector<std::pair<SpherePair, ImageShift>> pairs;
+  for (std::size_t i = 0; i < e; ++i) {
+    pairs.push_back({{static_cast<SphereIndex>(found[i]), static_cast<SphereIndex>(found[e + i])},
+                     {found_shifts[3 * i], found_shifts[3 * i + 1], found_shifts[3 * i + 2]}});
+  }
+  EXPECT_TRUE(pairs == pairs_of(expected)) << seed_note();
+}
+
+TEST_F(Cuda, PairsInAPeriodicCellAreWrittenToArraysOfTheCaller) {
+  Random random(base_seed());
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const PeriodicCell cell{{8, 9, Real(7.5)}};
+  for (const std::size_t n : {std::size_t{300}, std::size_t{9000}}) {
+    const Spheres spheres = gas_in(cell, n, n < 1000 ? Real(7.5) / 4 : Real(0.4), random);
+    const auto expected = find_periodic_contacts(*cpu, spheres, cell);
+    expect_pairs_in_arrays<std::int32_t>(collider, spheres, cell, expected);
+    expect_pairs_in_arrays<std::int64_t>(collider, spheres, cell, expected);
   }
 }
 
