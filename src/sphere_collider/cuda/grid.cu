@@ -83,9 +83,19 @@ __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     single_level_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ SingleLevelStorage storage[kGridWarps];
-  if (!is_valid_input(args) || !args.plan->single || args.plan->crowded) return;
+  if (!is_valid_input(args) || !args.plan->single || args.plan->queries != 0) return;
   SingleLevelSearcher<kPeriodic>(args, output, *args.plan, storage[threadIdx.x / 32])
       .run(blockIdx.x * kGridThreads + threadIdx.x);
+}
+
+template <bool kPeriodic, unsigned kQueries>
+__device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
+                               CrowdedStorage& storage) {
+  CrowdedSearcher<kPeriodic, kQueries> searcher(args, output, *args.plan, storage);
+  const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x - lane_id();
+  for (std::uint32_t k = 0; k < 32; k += kQueries) {
+    if (position + k < args.input.n) searcher.run(position + k);
+  }
 }
 
 template <bool kPeriodic>
@@ -93,30 +103,36 @@ __global__ void __launch_bounds__(kGridThreads, kCrowdedBlocks)
     crowded_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ CrowdedStorage storage[kGridWarps];
-  if (!is_valid_input(args) || !args.plan->crowded) return;
-  CrowdedSearcher<kPeriodic> searcher(args, output, *args.plan, storage[threadIdx.x / 32]);
-  const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x - lane_id();
-  for (std::uint32_t k = 0; k < 32; k += kQueries) {
-    if (position + k < args.input.n) searcher.run(position + k);
+  if (!is_valid_input(args)) return;
+  if (args.plan->queries == kCrowdedQueries) {
+    search_crowded<kPeriodic, kCrowdedQueries>(args, output, storage[threadIdx.x / 32]);
+  } else if (args.plan->queries == kVeryCrowdedQueries) {
+    search_crowded<kPeriodic, kVeryCrowdedQueries>(args, output, storage[threadIdx.x / 32]);
   }
 }
 
+/// Searches on several levels. After a search on a single level, the kernel for hashed cells stages
+/// the rows that are left.
 template <bool kDense, bool kPeriodic>
-__global__ void __launch_bounds__(kGridThreads, kLevelBlocks<kDense>) search_phase(GridArgs args) {
+__global__ void __launch_bounds__(kGridThreads, kLevelBlocks<kDense>)
+    search_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
-  __shared__ SearchStorage<kDense> storage;
+  union Storage {
+    SearchStorage<kDense> search;
+    RowStorage rows[kGridWarps];
+  };
+  __shared__ Storage storage;
   __shared__ GridPlan plan;
-  if (!is_valid_input(args) || args.plan->single || args.plan->dense != kDense) return;
+  if (!is_valid_input(args)) return;
+  if (args.plan->single) {
+    if constexpr (!kDense) {
+      stage_rows_again<kPeriodic, 2>(args, output, *args.plan, storage.rows[threadIdx.x / 32]);
+    }
+    return;
+  }
+  if (args.plan->dense != kDense) return;
   copy_plan(args, plan);
-  Searcher<kDense, kPeriodic>(args, plan, storage).run();
-}
-
-__global__ void __launch_bounds__(kGridThreads)
-    row_again_phase(GridArgs args, SearchOutput output) {
-  wait_for_previous_kernel();
-  __shared__ RowStorage storage[kGridWarps];
-  if (!is_valid_input(args) || !args.plan->single) return;
-  stage_rows_again(args, output, *args.plan, storage[threadIdx.x / 32]);
+  Searcher<kDense, kPeriodic>(args, plan, storage.search).run();
 }
 
 __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchOutput output) {
@@ -158,7 +174,7 @@ __global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, Search
   wait_for_previous_kernel();
   if (!has_long_rows(args, output)) return;
   if (args.plan->single) {
-    list_long_rows<kPeriodic>(args, *args.plan);
+    list_long_rows<kPeriodic, 4>(args, *args.plan);
   } else {
     place_overflow(args);
   }
@@ -247,10 +263,10 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, const GridL
   launch_sort(args, limits, stream);
   run(single_level_phase<kPeriodic>, chunks, args, output);
   run(crowded_phase<kPeriodic>, chunks, args, output);
-  run(search_phase<true, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<true>), args);
-  run(search_phase<false, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<false>),
-      args);
-  if (kPeriodic) run(row_again_phase, 8 * multiprocessors, args, output);
+  run(search_phase<true, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<true>), args,
+      output);
+  run(search_phase<false, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<false>), args,
+      output);
   run(sum_phase, many_blocks, args, output);
   run(copy_phase, chunks_of(args.input.rows()), args, output);
   run(emit_phase, many_blocks, args, output);

@@ -79,9 +79,10 @@ struct GridPlan {
   GridScale scale;
   bool dense;
   bool single;  ///< dense, and all spheres are on level 0
-  /// `single`, with more than kCrowded spheres per cube of the cell width on average, and a cell
-  /// width that local_filter.hpp supports
-  bool crowded;
+  /// Number of spheres that a warp searches for together, if it does: `single`, with more than
+  /// kCrowded or kVeryCrowded spheres per cube of the cell width on average, and a cell width that
+  /// local_filter.hpp supports. Otherwise 0.
+  std::uint32_t queries;
   bool equal_radii;  ///< of all spheres
   Real inverse_yz;   ///< inverse cell width of level 0, in y and z
   std::uint32_t buckets;
@@ -179,10 +180,13 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       plan.equal_radii = state.largest_half == ~state.smallest_half;
       // In a periodic cell, only pairs of equal spheres can be tested relative to a common origin.
       const bool is_decidable = plan.equal_radii || args.input.periodic.known == nullptr;
-      plan.crowded =
-          plan.single && is_decidable &&
-          x_cells * static_cast<Real>(args.input.n) > kCrowded * static_cast<Real>(all_cells) &&
-          scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
+      const Real per_cube =
+          x_cells * static_cast<Real>(args.input.n) / static_cast<Real>(all_cells);
+      const bool is_crowded = plan.single && is_decidable && per_cube > kCrowded &&
+                              scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
+      plan.queries = !is_crowded               ? 0
+                     : per_cube > kVeryCrowded ? kVeryCrowdedQueries
+                                               : kCrowdedQueries;
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table.size;
       plan.coarse_shift = 0;

@@ -8,6 +8,10 @@
 ///    if they are crowded, a warp searches for several of them together (grid_crowded.cuh);
 ///  - multi-level (grid_search.cuh): more spheres, of any radii, in several launches.
 ///
+/// In a periodic cell, images of spheres near its faces are further spheres without rows
+/// (periodic_pairs.cuh). There, one launch is direct or single-level, and any number of spheres
+/// that need several levels takes several launches.
+///
 /// The word row has two meanings. A row of cells consists of the cells of one level with the same y
 /// and z. Row a of the output, or of GridArgs::Rows, consists of the contacts (a, b), a < b.
 #pragma once

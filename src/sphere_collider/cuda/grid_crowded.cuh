@@ -9,14 +9,13 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Number of spheres, the queries, whose neighbors a warp finds together, and of consecutive lanes
-/// that share the tests of a query.
-inline constexpr unsigned kQueries = 8, kLanesOfQuery = 32 / kQueries;
-/// Number of candidates per warp, and of tests per lane before it checks whether candidates remain.
-inline constexpr unsigned kCandidates = 128, kTestsAtOnce = 32 / kLanesOfQuery;
+/// Number of candidates per warp.
+inline constexpr unsigned kCandidates = 128;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
 /// Largest number of neighbors that a lane keeps.
-inline constexpr unsigned kMaxOfLane = 15;
+inline constexpr unsigned kMaxOfLane = 19;
+/// Largest number of neighbors of all queries that are staged.
+inline constexpr unsigned kMaxOfWarp = 640;
 inline constexpr unsigned kSorted = 8;  // neighbors that a lane sorts in registers
 /// Largest number of cells in y or z around the spheres of one cell c. A search radius is one cell
 /// wide. Coordinates have at most kMaxCells cells, so a sum is rounded by at most 1/4 cell, and so
@@ -33,14 +32,21 @@ struct CrowdedStorage {
   };
   union {
     Candidates candidates;
-    std::uint32_t rows[kQueries * kMaxStaged];  // after the search: the b's of all queries
+    std::uint32_t rows[kMaxOfWarp];  // after the search: the b's of all queries
   };
   std::uint32_t found[kMaxOfLane * 32];  // lane l has the elements l, l + 32, l + 64, ...
 };
 
 /// Finds the neighbors b > a of each sphere a, and stages them like SingleLevelSearcher.
-template <bool kPeriodic>
+/// @tparam kQueries number of spheres, the queries, whose neighbors a warp finds together
+template <bool kPeriodic, unsigned kQueries>
 class CrowdedSearcher {
+  /// Number of consecutive lanes that share the tests of a query.
+  static constexpr unsigned kLanesOfQuery = 32 / kQueries;
+  static_assert(kLanesOfQuery == 4 || kLanesOfQuery == 8);
+  /// Number of tests per lane before it checks whether candidates remain.
+  static constexpr unsigned kTestsAtOnce = 32 / kLanesOfQuery;
+
  public:
   __device__ CrowdedSearcher(const GridArgs& args, const SearchOutput& output, const GridPlan& plan,
                              CrowdedStorage& storage)
@@ -242,40 +248,30 @@ class CrowdedSearcher {
     }
     const std::uint32_t before = length - found_;
     length = __shfl_sync(kFullWarp, length, kLanesOfQuery - 1, kLanesOfQuery);
-    const bool is_staged = length <= kMaxStaged;
-    const bool is_kept = !is_in_query(found_ > kMaxOfLane);
-    if constexpr (kPeriodic) {
-      const bool is_again = is_in_query(is_doubtful_) || (is_staged && !is_kept);
-      if (is_query && is_again && part() == 0) list_row_again(args_, position + query());
-      is_query = is_query && !is_again;
-    }
+    const bool is_short = length <= kMaxStaged, is_kept = !is_in_query(found_ > kMaxOfLane);
+    const bool is_doubtful = kPeriodic && is_in_query(is_doubtful_);
+    const bool is_known = is_query && !is_doubtful && (is_kept || !is_short);
     const bool is_last = part() == kLanesOfQuery - 1;
-    const std::uint32_t kept = is_query && is_staged ? length : 0;
+    std::uint32_t kept = is_known && is_short ? length : 0;
     const std::uint32_t sum = warp_inclusive_sum(is_last ? kept : 0);
     const std::uint32_t start = is_last ? sum - kept : sum;  // of the row of the query
-    const std::uint32_t all = __shfl_sync(kFullWarp, sum, 31);
+    const bool fits = start + kept <= kMaxOfWarp;            // if not, no later row fits
+    if (!fits) kept = 0;
+    if (is_query && !(is_known && fits) && part() == 0) list_row_again(args_, position + query());
+    const auto all = static_cast<std::uint32_t>(
+        highest_of_warp(kept != 0 ? static_cast<std::int32_t>(start + kept) : 0));
     unsigned long long index = 0;
     if (lane_id() == 0) {
       index = atomicAdd(&args_.state->contacts, static_cast<unsigned long long>(all));
     }
     index = __shfl_sync(kFullWarp, index, 0);
-    if (is_last && is_query) {
+    if (is_last && is_known && fits) {
       record_row(args_, id_, position + query(), length, index + start);
     }
     if (index + all > args_.rows.capacity) return;
     std::uint32_t* const row = s_.rows + start;
-    if (kept != 0 && is_kept) {
+    if (kept != 0) {
       for (unsigned k = 0; k < found_; ++k) row[before + k] = kept_id(k);
-    }
-    // A lane has found more neighbors than it can keep: these queries are searched again.
-    if constexpr (!kPeriodic) {
-      for (unsigned left = __ballot_sync(kFullWarp, kept != 0 && !is_kept && part() == 0);
-           left != 0; left &= left - 1) {
-        const int first = __ffs(static_cast<int>(left)) - 1;
-        list_neighbors<false>(args_, SingleLevel(plan_),
-                              position + static_cast<unsigned>(first) / kLanesOfQuery,
-                              s_.rows + __shfl_sync(kFullWarp, start, first));
-      }
     }
     __syncwarp();
     sort_row(row, kept <= kMaxSorted ? kept : 0);
@@ -313,6 +309,12 @@ class CrowdedSearcher {
     merge<true>(ids, 3, 2);
     merge<false>(ids, 1, 1);
     merge_halves(ids);
+    if constexpr (kLanesOfQuery == 8) {
+      merge<true>(ids, 7, 4);
+      merge<false>(ids, 2, 2);
+      merge<false>(ids, 1, 1);
+      merge_halves(ids);
+    }
 #pragma unroll
     for (unsigned k = 0; k < kSorted; ++k) {
       const unsigned i = kSorted * part() + k;

@@ -69,12 +69,17 @@ __device__ void search_and_copy(const GridArgs& args, const SearchOutput& output
   const unsigned warp = threadIdx.x / 32;
   const std::uint64_t warps = std::uint64_t{kGridWarps} * gridDim.x,
                       first_warp = kGridWarps * blockIdx.x + warp;
-  if (plan.crowded) {
-    CrowdedSearcher<kPeriodic> searcher(args, output, plan, storage.crowded[warp]);
+  const auto search_crowded = [&]<unsigned kQueries>(std::integral_constant<unsigned, kQueries>) {
+    CrowdedSearcher<kPeriodic, kQueries> searcher(args, output, plan, storage.crowded[warp]);
     for (std::uint64_t first = kQueries * first_warp; first < args.input.n;
          first += kQueries * warps) {
       searcher.run(static_cast<std::uint32_t>(first));
     }
+  };
+  if (plan.queries == kCrowdedQueries) {
+    search_crowded(std::integral_constant<unsigned, kCrowdedQueries>());
+  } else if (plan.queries == kVeryCrowdedQueries) {
+    search_crowded(std::integral_constant<unsigned, kVeryCrowdedQueries>());
   } else if constexpr (kPeriodic) {
     for (std::uint64_t first = 32 * first_warp; first < args.input.n; first += 32 * warps) {
       SingleLevelSearcher<true>(args, output, plan, storage.single[warp])
@@ -82,8 +87,8 @@ __device__ void search_and_copy(const GridArgs& args, const SearchOutput& output
     }
   }
   grid.sync();
-  if constexpr (kPeriodic) {
-    stage_rows_again(args, output, plan, storage.rows[warp]);
+  if (args.state->rows_again != 0) {
+    stage_rows_again<kPeriodic, 1>(args, output, plan, storage.rows[warp]);
     grid.sync();
   }
   const bool complete = is_complete(args, output);
@@ -95,7 +100,7 @@ __device__ void search_and_copy(const GridArgs& args, const SearchOutput& output
   copy_bins(args, known, storage.copy);
   if (args.state->overflow == 0) return;
   grid.sync();
-  list_long_rows<kPeriodic>(args, plan);
+  list_long_rows<kPeriodic, 1>(args, plan);
   grid.sync();
   emit_long_rows(args, known, storage.long_rows);
 }
@@ -170,7 +175,7 @@ __global__ void __launch_bounds__(kGridThreads, kOneLaunchBlocks)
   grid.sync();
   scatter(args);
   grid.sync();
-  if (kPeriodic || plan.crowded) {
+  if (kPeriodic || plan.queries != 0) {
     search_and_copy<kPeriodic>(args, output, plan, storage, grid);
   } else {
     search_and_emit(args, output, plan, storage, grid);

@@ -297,8 +297,9 @@ class SingleLevelSearcher {
 
 /// A warp finds the neighbors b > a of the sphere a at a position, and writes up to `capacity` of
 /// them in any order.
+/// @tparam kLoads of candidates in flight per lane
 /// @return the number of neighbors
-template <bool kPeriodic>
+template <bool kPeriodic, unsigned kLoads>
 __device__ std::uint32_t list_neighbors(const GridArgs& args, const SingleLevel& level,
                                         std::uint32_t position, std::uint32_t* neighbors,
                                         std::uint32_t capacity = ~0u) {
@@ -319,32 +320,39 @@ __device__ std::uint32_t list_neighbors(const GridArgs& args, const SingleLevel&
     if (has_row) mine = at_mine.peek(args.table.starts);
     const std::uint32_t sum = warp_inclusive_sum(mine.y - mine.x);
     const std::uint32_t candidates = __shfl_sync(kFullWarp, sum, 31);
-    for (std::uint32_t first = 0; first < candidates; first += 32) {
-      const std::uint32_t i = first + lane_id();
-      const unsigned owner = owner_of(i, sum);
-      const std::uint32_t past = __shfl_sync(kFullWarp, mine.y, owner);
-      const std::uint32_t k = past - (__shfl_sync(kFullWarp, sum, owner) - i);
-      std::uint32_t b = 0;
-      if (i < candidates) {
-        const SphereInstance other = load_sorted(args.table.sorted + k);
-        const Real e = excess(self, other);
-        if (!(e > bound)) b = sphere_of<kPeriodic>(args.table.ids[k]);
-        if (b > a && !(e < -doubt) && !touch_exactly<kPeriodic>(args.input, a, self, b, other)) {
+    for (std::uint32_t first = 0; first < candidates; first += 32 * kLoads) {
+      SphereInstance others[kLoads];
+      std::uint32_t ids[kLoads];
+#pragma unroll
+      for (unsigned j = 0; j < kLoads; ++j) {
+        const std::uint32_t i = first + 32 * j + lane_id();
+        const unsigned owner = owner_of(i, sum);
+        const std::uint32_t past = __shfl_sync(kFullWarp, mine.y, owner);
+        const std::uint32_t k = past - (__shfl_sync(kFullWarp, sum, owner) - i);
+        others[j] = load_sorted(args.table.sorted + (i < candidates ? k : position));
+        ids[j] = i < candidates ? args.table.ids[k] : a;
+      }
+#pragma unroll
+      for (unsigned j = 0; j < kLoads; ++j) {
+        const Real e = excess(self, others[j]);
+        std::uint32_t b = e > bound ? 0 : sphere_of<kPeriodic>(ids[j]);
+        if (b > a && !(e < -doubt) &&
+            !touch_exactly<kPeriodic>(args.input, a, self, b, others[j])) {
           b = 0;
         }
+        const unsigned found = __ballot_sync(kFullWarp, b > a);
+        const std::uint32_t at = count + static_cast<std::uint32_t>(__popc(found & lanes_below()));
+        if (b > a && at < capacity) neighbors[at] = b;
+        count += static_cast<std::uint32_t>(__popc(found));
       }
-      const unsigned found = __ballot_sync(kFullWarp, b > a);
-      const std::uint32_t at = count + static_cast<std::uint32_t>(__popc(found & lanes_below()));
-      if (b > a && at < capacity) neighbors[at] = b;
-      count += static_cast<std::uint32_t>(__popc(found));
     }
   }
   return count;
 }
 
-/// A warp sorts a row of up to kMaxStaged neighbors by rank (number of smaller neighbors).
-__device__ inline void sort_row_of_warp(std::uint32_t* row, std::uint32_t length) {
-  constexpr unsigned kOfLane = (kMaxStaged + 31) / 32;
+/// A warp sorts a row of up to 32 * kOfLane neighbors by rank (number of smaller neighbors).
+template <unsigned kOfLane>
+__device__ void sort_by_rank(std::uint32_t* row, std::uint32_t length) {
   std::uint32_t ids[kOfLane], ranks[kOfLane] = {};
 #pragma unroll
   for (unsigned k = 0; k < kOfLane; ++k) {
@@ -363,23 +371,32 @@ __device__ inline void sort_row_of_warp(std::uint32_t* row, std::uint32_t length
   }
   __syncwarp();
 }
+/// A warp sorts a row of up to kMaxStaged neighbors.
+__device__ inline void sort_row_of_warp(std::uint32_t* row, std::uint32_t length) {
+  if (length <= 64) {
+    sort_by_rank<2>(row, length);
+  } else {
+    sort_by_rank<(kMaxStaged + 31) / 32>(row, length);
+  }
+}
 
 /// Shared memory of a warp.
 struct RowStorage {
   std::uint32_t row[kMaxStaged];
 };
 
-/// Stages the rows of list_row_again(), after exact tests where they are needed: a warp for each.
-/// @pre the output is of pairs, as always in a periodic cell
-__device__ inline void stage_rows_again(const GridArgs& args, const SearchOutput& output,
-                                        const GridPlan& plan, RowStorage& s) {
+/// Stages the rows of list_row_again(): a warp for each.
+template <bool kPeriodic, unsigned kLoads>
+__device__ void stage_rows_again(const GridArgs& args, const SearchOutput& output,
+                                 const GridPlan& plan, RowStorage& s) {
   const SingleLevel level(plan);
   const SearchOutput staging = staging_output(args, output);
   const std::uint32_t rows = args.state->rows_again;
   for (std::uint32_t k = blockIdx.x * kGridWarps + threadIdx.x / 32; k < rows;
        k += gridDim.x * kGridWarps) {
     const std::uint32_t position = args.table.ranks[k], a = args.table.ids[position];
-    const std::uint32_t length = list_neighbors<true>(args, level, position, s.row, kMaxStaged),
+    const std::uint32_t length = list_neighbors<kPeriodic, kLoads>(args, level, position, s.row,
+                                                                   kMaxStaged),
                         staged = length <= kMaxStaged ? length : 0;
     unsigned long long index = 0;
     if (lane_id() == 0) {
@@ -390,13 +407,21 @@ __device__ inline void stage_rows_again(const GridArgs& args, const SearchOutput
     __syncwarp();
     if (index + staged > args.rows.capacity) continue;
     sort_row_of_warp(s.row, staged);
-    for (std::uint32_t i = lane_id(); i < staged; i += 32) staging.neighbors[index + i] = s.row[i];
+    const SphereInstance self = load_sorted(args.table.sorted + position);
+    for (std::uint32_t i = lane_id(); i < staged; i += 32) {
+      const std::uint32_t b = s.row[i];
+      if (kPeriodic || staging.contacts == nullptr) {
+        staging.neighbors[index + i] = b;
+      } else {
+        write_contact(staging, index + i, a, b, self, load_sphere(args.input, b));
+      }
+    }
     __syncwarp();
   }
 }
 
 /// Writes the neighbors of all rows that were not staged to Rows::long_row_neighbors.
-template <bool kPeriodic>
+template <bool kPeriodic, unsigned kLoads>
 __device__ void list_long_rows(const GridArgs& args, const GridPlan& plan) {
   const SingleLevel level(plan);
   const std::uint32_t long_rows = args.state->long_rows,
@@ -405,8 +430,8 @@ __device__ void list_long_rows(const GridArgs& args, const GridPlan& plan) {
        k += gridDim.x * kGridWarps) {
     const std::uint32_t a =
         k < long_rows ? args.rows.long_rows[k] : args.rows.very_long_rows[k - long_rows];
-    list_neighbors<kPeriodic>(args, level, args.table.positions[a],
-                              args.rows.long_row_neighbors + args.rows.offsets[a]);
+    list_neighbors<kPeriodic, kLoads>(args, level, args.table.positions[a],
+                                      args.rows.long_row_neighbors + args.rows.offsets[a]);
   }
 }
 

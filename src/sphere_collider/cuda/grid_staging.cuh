@@ -8,10 +8,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Location of a row in the staging buffer: index (58 bits) and length (6 bits). For a long row,
+/// Location of a row in the staging buffer: index (57 bits) and length (7 bits). For a long row,
 /// which is not staged, the second field is kNotStaged and the first field is the length.
 struct StagedList {
-  static constexpr unsigned kCountBits = 6, kNotStaged = 63;
+  static constexpr unsigned kCountBits = 7, kNotStaged = 127;
   unsigned long long bits;
   __device__ bool is_long() const { return (bits & kNotStaged) == kNotStaged; }
   __device__ unsigned long long index() const { return bits >> kCountBits; }
@@ -57,10 +57,10 @@ __device__ inline void record_row(const GridArgs& args, std::uint32_t a, std::ui
   }
 }
 
-/// Lists the row of the sphere at a position for stage_rows_again(). A search in a periodic cell
-/// does not write a row if a distance is too close to the sum of the radii to decide it from
-/// reduced spheres and images, or if the row has too many neighbors for it: the code for these
-/// cases would cost the registers of all.
+/// Lists the row of the sphere at a position for stage_rows_again(). A search does not write a row
+/// itself if it has no room for its neighbors, or if a distance in a periodic cell is too close to
+/// the sum of the radii to decide it from reduced spheres and images: the code for these cases
+/// would cost the registers of all.
 __device__ inline void list_row_again(const GridArgs& args, std::uint32_t position) {
   args.table.ranks[atomicAdd(&args.state->rows_again, 1u)] = position;
 }
@@ -70,54 +70,58 @@ __device__ inline std::uint32_t bins_of(const GridArgs& args) {
   return (args.input.rows() - 1) / kBin + 1;
 }
 
+/// Number of staged contacts of a bin that a block copies at a time: most bins have fewer.
+inline constexpr std::uint32_t kOwned = 60 * kGridThreads;
+
 struct CopyStorage {
   // Start of a row in the staging buffer and in the output, each minus its start in the bin.
   unsigned long long from[kGridThreads], to[kGridThreads];
   BlockSums::TempStorage sums;
-  std::uint8_t owners[kMaxStaged * kGridThreads];  // row of each staged contact of the bin
+  std::uint8_t owners[kOwned];  // rows of kOwned consecutive staged contacts of the bin
 };
 
-/// A block copies the `count` staged contacts of a bin to the output.
+/// A block copies some staged contacts of a bin, whose owners are known, to the output.
 __device__ inline void copy_contacts(const SphereContact* staging, SphereContact* output,
-                                     std::uint32_t count, const CopyStorage& s) {
+                                     std::uint32_t first, std::uint32_t past,
+                                     const CopyStorage& s) {
   constexpr unsigned kAtOnce = 4, kWords = sizeof(SphereContact) / 8;
   static_assert(sizeof(SphereContact) % 8 == 0);
   const auto* const from = reinterpret_cast<const unsigned long long*>(staging);
   auto* const to = reinterpret_cast<unsigned long long*>(output);
-  const std::uint32_t words = count * kWords;
-  for (std::uint32_t first = threadIdx.x; first < words; first += kAtOnce * kGridThreads) {
+  const std::uint32_t words = (past - first) * kWords;
+  for (std::uint32_t begin = threadIdx.x; begin < words; begin += kAtOnce * kGridThreads) {
     unsigned long long values[kAtOnce], indices[kAtOnce];
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
-      const std::uint32_t w = min(first + k * kGridThreads, words - 1), record = w / kWords;
+      const std::uint32_t w = min(begin + k * kGridThreads, words - 1), record = w / kWords;
       const unsigned owner = s.owners[record], word = w % kWords;
-      values[k] = from[(s.from[owner] + record) * kWords + word];
-      indices[k] = (s.to[owner] + record) * kWords + word;
+      values[k] = from[(s.from[owner] + first + record) * kWords + word];
+      indices[k] = (s.to[owner] + first + record) * kWords + word;
     }
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
-      if (first + k * kGridThreads < words) to[indices[k]] = values[k];
+      if (begin + k * kGridThreads < words) to[indices[k]] = values[k];
     }
   }
 }
 
-/// A block writes the pairs of the `count` staged neighbors of a bin, whose first row is first_a.
+/// The same for pairs, whose second indices are staged. The first row of the bin is first_a.
 __device__ inline void copy_pairs(const std::uint32_t* staging, const SearchOutput& output,
-                                  std::uint32_t first_a, std::uint32_t count,
+                                  std::uint32_t first_a, std::uint32_t first, std::uint32_t past,
                                   const CopyStorage& s) {
   constexpr unsigned kAtOnce = 4;
-  for (std::uint32_t first = threadIdx.x; first < count; first += kAtOnce * kGridThreads) {
+  for (std::uint32_t begin = first + threadIdx.x; begin < past; begin += kAtOnce * kGridThreads) {
     std::uint32_t neighbors[kAtOnce], owners[kAtOnce];
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
-      const std::uint32_t i = min(first + k * kGridThreads, count - 1);
-      owners[k] = s.owners[i];
+      const std::uint32_t i = min(begin + k * kGridThreads, past - 1);
+      owners[k] = s.owners[i - first];
       neighbors[k] = staging[s.from[owners[k]] + i];
     }
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
-      const std::uint32_t i = first + k * kGridThreads;
-      if (i < count) write_pair(output, s.to[owners[k]] + i, first_a + owners[k], neighbors[k]);
+      const std::uint32_t i = begin + k * kGridThreads;
+      if (i < past) write_pair(output, s.to[owners[k]] + i, first_a + owners[k], neighbors[k]);
     }
   }
 }
@@ -169,19 +173,23 @@ __device__ inline unsigned long long copy_bin(const GridArgs& args, const Search
   const auto all = static_cast<std::uint32_t>(total & ((1u << kStagedBits) - 1));
   s.from[threadIdx.x] = list.index() - start;
   s.to[threadIdx.x] = before + (sums >> kStagedBits) - start;
-  for (std::uint32_t k = 0; k < staged; ++k) {
-    s.owners[start + k] = static_cast<std::uint8_t>(threadIdx.x);
-  }
   if (list.is_long()) {
     args.table.ranks[a] = count;
     defer_row(args, a, count, before + (sums >> kStagedBits));
   }
-  __syncthreads();
-  if (output.contacts != nullptr) {
-    copy_contacts(args.scratch.staging, output.contacts, all, s);
-  } else {
-    copy_pairs(reinterpret_cast<const std::uint32_t*>(args.scratch.staging), output, bin * kBin,
-               all, s);
+  for (std::uint32_t first = 0; first < all; first += kOwned) {
+    const std::uint32_t past = min(first + kOwned, all);
+    for (std::uint32_t k = max(start, first); k < min(start + staged, past); ++k) {
+      s.owners[k - first] = static_cast<std::uint8_t>(threadIdx.x);
+    }
+    __syncthreads();
+    if (output.contacts != nullptr) {
+      copy_contacts(args.scratch.staging, output.contacts, first, past, s);
+    } else {
+      copy_pairs(reinterpret_cast<const std::uint32_t*>(args.scratch.staging), output, bin * kBin,
+                 first, past, s);
+    }
+    __syncthreads();
   }
   return total >> kStagedBits;
 }

@@ -54,10 +54,14 @@ inline constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
 inline constexpr std::uint32_t kSamples = 4096;
 /// Number of spheres per cell from which a warp searches for several spheres together.
 inline constexpr Real kCrowded = 3;
+/// The same from which it searches for fewer, with more lanes for each.
+inline constexpr Real kVeryCrowded = 15;
+/// Number of spheres that a warp searches for together in both cases.
+inline constexpr unsigned kCrowdedQueries = 8, kVeryCrowdedQueries = 4;
 /// Number of neighbor slots per sphere; further neighbors are appended to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
 /// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
-inline constexpr std::uint32_t kMaxStaged = 60;
+inline constexpr std::uint32_t kMaxStaged = 124;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.
 inline constexpr std::uint32_t kMaxLongRow = 1024;
 /// The single-level search counts contacts in bins of this number of consecutive rows. One block
