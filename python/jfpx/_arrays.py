@@ -318,7 +318,7 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
         lengths = list(lengths)
     except TypeError:
         raise InvalidArgument(f"periodic is {lengths!r}; it must be three lengths") from None
-    has_rows = any(row is not None and not isinstance(row, str) and np.ndim(row) > 0 for row in lengths)
+    has_rows = any(_is_row(row) for row in lengths)
     if has_rows and systems is None:
         raise InvalidArgument("periodic is a matrix; it must be the three lengths of an orthogonal cell, such as "
                               "periodic.diagonal(); find_neighbors(cell=) takes cells of any shape")
@@ -330,7 +330,7 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
         raise InvalidArgument(f"periodic has {len(lengths)} cells; it must have one for each of "
                               f"{systems} systems")
     for row in lengths:
-        if row is None or isinstance(row, str) or np.ndim(row) == 0:
+        if not _is_row(row):
             raise InvalidArgument(f"periodic has the cell {row!r}; it must be three lengths")
     rows = [_cell(row) for row in lengths]
     # A symmetric 3 x 3 array is the matrix of one skewed cell, unless its three rows are equal.
@@ -341,12 +341,18 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     return matrix
 
 
+def _is_row(value: Any) -> bool:
+    if value is None or isinstance(value, (int, float, str)):  # np.ndim() would make an array of it
+        return False
+    return np.ndim(value) > 0
+
+
 def _cell(lengths: Any) -> list[float]:
     if len(lengths) != 3:
         raise InvalidArgument(f"periodic has {len(lengths)} lengths; it must have 3")
     for length in lengths:
         if isinstance(length, (bool, np.bool_)) or (length is not None and not isinstance(length, str)
-                                                    and np.ndim(length) == 0 and length == 0):
+                                                    and not _is_row(length) and length == 0):
             raise InvalidArgument(f"periodic is {tuple(lengths)}; it must be the three lengths of the cell, and "
                                   "None along axes that do not repeat, such as (10, 10, None)")
     return [math.nan if length is None else number(length, "periodic") for length in lengths]

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <limits>
+#include <random>
 #if defined(_WIN32)
 #include <malloc.h>
 #endif
@@ -72,6 +73,16 @@ std::size_t with_every_failure(
   std::size_t failures = 0;
   for (const Shortage shortage : {Shortage::once, Shortage::permanent}) {
     for (std::size_t k = 0; attempt(k, shortage); ++k) ++failures;
+  }
+  return failures;
+}
+
+std::size_t with_some_failures(
+    std::uint64_t seed, const std::function<bool(std::size_t k, Shortage shortage)>& attempt) {
+  std::size_t failures = 0;
+  std::mt19937_64 random(seed);
+  for (const Shortage shortage : {Shortage::once, Shortage::permanent}) {
+    for (std::size_t k = 0; attempt(k, shortage); k += 1 + random() % (1 + k / 16)) ++failures;
   }
   return failures;
 }

@@ -4,6 +4,7 @@
 #include <jfpx/error.hpp>
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <new>
 
@@ -37,6 +38,10 @@ std::size_t live_allocations();
 /// @return number of calls that returned true
 std::size_t with_every_failure(
     const std::function<bool(std::size_t k, Shortage shortage)>& attempt);
+/// The same for a sample, for attempts that make many allocations: the first 16 of them, then
+/// random ones whose distances grow with k, so that the number of calls grows like the logarithm.
+std::size_t with_some_failures(
+    std::uint64_t seed, const std::function<bool(std::size_t k, Shortage shortage)>& attempt);
 
 /// Executes the call with a failing k-th allocation.
 /// @return whether the call threw OutOfMemory or std::bad_alloc

@@ -38,6 +38,7 @@ using test::operator""_r;
 
 using MakeDevice = std::function<std::unique_ptr<DeviceWorld>(const Scene&)>;
 struct Kind {
+  friend void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
   std::string name;
   MakeDevice make;
   std::uint32_t most_in_one_block = soft_step::kMostBodiesInOneBlock;

@@ -280,7 +280,7 @@ TEST(QueryTree, QueriesFindWhatALinearScanFinds) {
   SCOPED_TRACE(trace(seed));
   Random random(seed);
   std::uint64_t hits = 0, found = 0, cast_hits = 0, distances = 0;
-  for (int run = 0; run < 300; ++run) {
+  for (int run = 0; run < 100; ++run) {
     const bool usual = run % 2 == 0;
     const Real size = usual ? 1 : random_size(&random, -30, 8);
     const Vec3 direction = random_direction(&random);
@@ -309,10 +309,10 @@ TEST(QueryTree, QueriesFindWhatALinearScanFinds) {
       change(&random, place, &world);
     }
   }
-  EXPECT_GT(hits, 100000u);
-  EXPECT_GT(found, 100000u);
-  EXPECT_GT(cast_hits, 1000u);
-  EXPECT_GT(distances, 10000u);
+  EXPECT_GT(hits, 30000u);
+  EXPECT_GT(found, 30000u);
+  EXPECT_GT(cast_hits, 300u);
+  EXPECT_GT(distances, 3000u);
 }
 
 /// Rounding makes a ray from far away hit spheres beside it, also outside of their exact bounds.

@@ -110,7 +110,7 @@ struct GridArgs {
     SphereInstance* partitioned;     ///< [n] spheres by coarse bucket
     std::uint32_t* partitioned_ids;  ///< [n] their indices
     std::uint32_t* neighbors;        ///< [n][kSlots] the first b's of a row, by position
-    SphereContact* staging;  ///< [capacity] contacts, or neighbors, of short rows by position
+    SphereContact* staging;          ///< [capacity] contacts, or neighbors, of short rows
   };
   SphereInput input;  ///< at least one sphere; packed, but for a search in one launch
   Table table;

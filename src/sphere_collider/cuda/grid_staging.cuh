@@ -1,5 +1,5 @@
-/// Staging buffer in global memory: holds the contacts of the single-level search, in the order of
-/// cells, until their indices in the output are known.
+/// Staging buffer in global memory: holds the contacts of the single-level search, row by row in
+/// about the order of cells, until their indices in the output are known.
 #pragma once
 
 #include "src/sphere_collider/cuda/grid_emit.cuh"
@@ -38,7 +38,7 @@ __device__ inline SearchOutput staging_output(const GridArgs& args, const Search
   return staging;
 }
 
-/// Records that row `a`, of the sphere at a position, is too long to be staged.
+/// Records that row `a`, of the sphere at a position, is longer than the search can stage.
 __device__ inline void record_long_row(const GridArgs& args, std::uint32_t a,
                                        std::uint32_t position, std::uint32_t length) {
   args.rows.offsets[a] = staged_list(length, StagedList::kNotStaged).bits;
@@ -57,10 +57,10 @@ __device__ inline void record_row(const GridArgs& args, std::uint32_t a, std::ui
   }
 }
 
-/// Lists the row of the sphere at a position for stage_rows_again(). A search does not write a row
-/// itself if it has no room for its neighbors, or if a distance in a periodic cell is too close to
-/// the sum of the radii to decide it from reduced spheres and images: the code for these cases
-/// would cost the registers of all.
+/// Lists the row of the sphere at a position for stage_rows_again(). The crowded search does not
+/// write a row itself if a lane has no room for its neighbors, and no search does if a distance in
+/// a periodic cell is too close to the sum of the radii to decide it from reduced spheres and
+/// images: the code for these cases would cost the registers of all.
 __device__ inline void list_row_again(const GridArgs& args, std::uint32_t position) {
   args.table.ranks[atomicAdd(&args.state->rows_again, 1u)] = position;
 }

@@ -42,7 +42,7 @@ struct alignas(16) SearchState {
   std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
   std::uint32_t cell_is_full;        ///< 1: a cell of the direct search has no free slot
   std::uint32_t block_is_full;       ///< 1: a block of the direct search found too many pairs
-  unsigned long long long_row_contacts;  ///< contacts of rows that the staging buffer cannot hold
+  unsigned long long long_row_contacts;  ///< contacts of rows that are not staged
   std::uint32_t same_cell[32];           ///< pairs of sampled spheres in one cell, by level
 };
 
