@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 from collections.abc import Callable, Iterable
@@ -12,6 +13,7 @@ import numpy as np
 from . import _core
 from ._errors import InvalidArgument
 
+_NoneType = type(None)
 PRECISIONS = {np.dtype(np.float32): _core.f32, np.dtype(np.float64): _core.f64}
 
 
@@ -180,11 +182,17 @@ def vectors(value: Any, name: str, size: int, dtype: Any) -> np.ndarray:
     return array
 
 
+@functools.cache
+def _distances(dtype: np.dtype) -> tuple[float, float]:
+    """The least and the largest distance whose square is exact to the precision of the dtype."""
+    limits = np.finfo(dtype)
+    return math.sqrt(float(limits.tiny) / float(limits.eps)), math.sqrt(float(limits.max))
+
+
 def check_square(distance: float, what: str, dtype: Any) -> None:
     """Raises InvalidArgument unless the square of a distance is exact to the precision of the dtype.
     @param what names the argument and its value"""
-    limits = np.finfo(dtype)
-    low, high = math.sqrt(float(limits.tiny) / float(limits.eps)), math.sqrt(float(limits.max))
+    low, high = _distances(np.dtype(dtype))
     if not low <= distance <= high:
         raise InvalidArgument(f"{what}, and the square of the distance {distance:g} is not exact in "
                               f"{np.dtype(dtype)}; use a unit of length in which distances are in [{low:.2g}, {high:.2g}]")
@@ -203,6 +211,12 @@ def radii_of(array: Any, name: str, size: int, dtype: Any) -> np.ndarray:
     for radius in (low, high):
         check_square(2 * radius, f"{name} has the radius {radius:g}", radii.dtype)
     return radii
+
+
+@functools.lru_cache(maxsize=256, typed=True)  # True is not 1
+def radius_of(radius: float, name: str, dtype: str) -> float:
+    """radii_of() for a number, as a number."""
+    return float(radii_of(radius, name, 1, dtype)[0])
 
 
 def plain_numbers(value: Any, name: str) -> np.ndarray:
@@ -314,6 +328,9 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     each."""
     if lengths is None:
         return None
+    # Not booleans, which equal numbers.
+    if systems is None and type(lengths) is tuple and all(type(x) in (float, int, _NoneType) for x in lengths):
+        return _one_cell(lengths)
     try:
         lengths = list(lengths)
     except TypeError:
@@ -339,6 +356,13 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
             and len(set(map(tuple, rows))) > 1):
         raise InvalidArgument("periodic is a matrix; it must be a row of three lengths for each system")
     return matrix
+
+
+@functools.lru_cache(maxsize=256)
+def _one_cell(lengths: tuple[float | None, ...]) -> np.ndarray:
+    cell = np.array([_cell(lengths)])
+    cell.flags.writeable = False  # the next call returns it, too
+    return cell
 
 
 def _is_row(value: Any) -> bool:

@@ -230,7 +230,7 @@ class DeviceSearch:
         if isinstance(radii, (bool, int, float)) or getattr(radii, "shape", None) == ():
             if hasattr(radii, "shape"):
                 radii = radii.item()  # waits, where it is on the device
-            return *start, 0, 0, float(_arrays.radii_of(radii, name, 1, self.dtype)[0])
+            return *start, 0, 0, _arrays.radius_of(radii, name, self.dtype)
         view = self._view(radii, name)
         if view.shape != (size,):
             raise InvalidArgument(f"{name} has shape {view.shape}; it must be a number or ({size},)")
