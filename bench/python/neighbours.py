@@ -51,6 +51,21 @@ def median_ms(call, synchronize=lambda: None, repeats=15, waits_after=True):
     return statistics.median(times)
 
 
+def medians_in_turns(searches, repeats, warm_up=0, synchronize=lambda: None):
+    """Median times of searches by name, which take turns, so that other load of the machine has the same
+    effect on each, and their last results."""
+    times, results = {name: [] for name in searches}, {}
+    for i in range(warm_up + repeats):
+        for name, search in searches.items():
+            synchronize()
+            begin = time.perf_counter()
+            results[name] = search()
+            synchronize()
+            if i >= warm_up:
+                times[name].append(1e3 * (time.perf_counter() - begin))
+    return {name: statistics.median(values) for name, values in times.items()}, results
+
+
 def row(*cells):
     print("| " + " | ".join(f"{cell:.3g}" if isinstance(cell, float) else str(cell)
                             for cell in cells) + " |", flush=True)
@@ -100,7 +115,7 @@ def lists_of(positions, cutoff, cell):
 
 
 def cells():
-    """All libraries take turns, so that other load of the machine has the same effect on each."""
+    """Neighbor lists in cells of two shapes; all libraries take turns."""
     libraries = ("jfpx", "find_pairs", "vesin", "matscipy", "SciPy")
     print("\n## Periodic cells, float64, one thread, ms\n\nMedians; the libraries take turns. `find_pairs` is that of "
           "jfpx. matscipy lists both orders, SciPy has no shifts.\n\n"
@@ -114,14 +129,8 @@ def cells():
                 lists = lists_of(positions, cutoff, cell)
                 if n * neighbours > 2_000_000:
                     lists.pop("matscipy", None)  # takes minutes
-                times, pairs = {library: [] for library in lists}, {}
-                for _ in range(5 if n * neighbours <= 300_000 else 3):
-                    for library, search in lists.items():
-                        begin = time.perf_counter()
-                        pairs[library] = search()
-                        times[library].append(1e3 * (time.perf_counter() - begin))
+                medians, pairs = medians_in_turns(lists, 5 if n * neighbours <= 300_000 else 3)
                 assert len(set(pairs.values())) == 1, pairs
-                medians = {library: statistics.median(values) for library, values in times.items()}
                 others = [medians[library] for library in ("vesin", "matscipy", "SciPy") if library in medians]
                 row(name, n, neighbours, pairs["jfpx"], *(medians.get(library, "-") for library in libraries),
                     min(others) / medians["jfpx"] if others else "-")
@@ -343,22 +352,12 @@ def periodic_on_device():
                 searches.update(nvalchemi_lists(x, cutoff, neighbours, cell))
             except ImportError:
                 pass
-            times = {name: [] for name in searches}
-            for i in range(5 + (60 if n * neighbours <= 3_000_000 else 15)):
-                for name, search in searches.items():
-                    wait()
-                    begin = time.perf_counter()
-                    search()
-                    wait()
-                    if i >= 5:
-                        times[name].append(1e3 * (time.perf_counter() - begin))
-            medians = {name: statistics.median(values) for name, values in times.items()}
-            pairs = searches["periodic"]()[0].shape[1]
-            cells = [n, neighbours, pairs, medians["open"], medians["periodic"],
+            repeats = 60 if n * neighbours <= 3_000_000 else 15
+            medians, results = medians_in_turns(searches, repeats, warm_up=5, synchronize=wait)
+            cells = [n, neighbours, results["periodic"][0].shape[1], medians["open"], medians["periodic"],
                      medians["periodic"] / medians["open"]]
             if "pairs" in medians:
-                found = searches["pairs"]()
-                cells += [medians["matrix"], medians["pairs"], found[0].shape[1],
+                cells += [medians["matrix"], medians["pairs"], results["pairs"][0].shape[1],
                           medians["matrix"] / medians["periodic"], medians["pairs"] / medians["periodic"]]
             row(*cells)
 
