@@ -6,6 +6,7 @@ import functools
 import math
 import os
 from collections.abc import Callable, Iterable
+from types import NoneType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,6 @@ import numpy as np
 from . import _core
 from ._errors import InvalidArgument
 
-_NoneType = type(None)
 PRECISIONS = {np.dtype(np.float32): _core.f32, np.dtype(np.float64): _core.f64}
 
 
@@ -329,7 +329,7 @@ def cells(lengths: Any, systems: int | None) -> np.ndarray | None:
     if lengths is None:
         return None
     # Not booleans, which equal numbers.
-    if systems is None and type(lengths) is tuple and all(type(x) in (float, int, _NoneType) for x in lengths):
+    if systems is None and type(lengths) is tuple and all(type(x) in (float, int, NoneType) for x in lengths):
         return _one_cell(lengths)
     try:
         lengths = list(lengths)

@@ -25,7 +25,7 @@ JFPX_HD inline ImageShift shift_of(std::uint32_t code) {
 }
 
 /// Squares of shorter lengths underflow: 2^-73, in double 2^-536.
-inline constexpr auto kNegligible = static_cast<Real>(sizeof(Real) == 4 ? 0x1p-73 : 0x1p-536);
+inline constexpr auto kShortest = static_cast<Real>(sizeof(Real) == 4 ? 0x1p-73 : 0x1p-536);
 
 /// Largest length of a cell: squares of distances in a few cells are finite.
 inline constexpr auto kLongestPeriod = static_cast<Real>(sizeof(Real) == 4 ? 0x1p60 : 0x1p508);
@@ -125,8 +125,8 @@ JFPX_HD inline CellErrors errors_in(const PeriodicCell& cell) {
     squares += cell.lengths[k] * cell.lengths[k];
   }
   if (!repeats) return {0, 0};
-  const Real distance = square_root(squares) * (Real(1.1) * kEpsilon) + kNegligible;
-  return {distance, distance * Real(0.55) + kNegligible};
+  const Real distance = square_root(squares) * (Real(1.1) * kEpsilon) + kShortest;
+  return {distance, distance * Real(0.55) + kShortest};
 }
 
 JFPX_HD inline Real reduced_radius(Real radius, const CellErrors& errors) {
@@ -213,7 +213,7 @@ struct ImageTouch {
 /// true distance of at most s (1 + 6u) plus what underflows in squares (sphere_filter.hpp).
 JFPX_HD inline ImageTouch touch_in_cell(const SphereInstance& a, const SphereInstance& b,
                                         const PeriodicCell& cell) {
-  const Real reach = (a.radius + b.radius) * (1 + 8 * kEpsilon) + kNegligible;
+  const Real reach = (a.radius + b.radius) * (1 + 8 * kEpsilon) + kShortest;
   ImageShift between{};  // what the reduction displaced a by, minus the same of b
   bool near[3][3];       // images with the shifts -1, 0 and 1 along each axis
   for (int k = 0; k < 3; ++k) {
@@ -251,7 +251,7 @@ JFPX_HD inline ImageTouch touch_in_cell(const SphereInstance& a, const SphereIns
 /// Whether two spheres may touch through two images, which are half a length away on both sides.
 /// @param sum of their radii
 JFPX_HD inline bool may_touch_twice(Real sum, Real length) {
-  return !(sum + 2 * kNegligible < length * (Real(0.5) - 4 * kEpsilon));
+  return !(sum + 2 * kShortest < length * (Real(0.5) - 4 * kEpsilon));
 }
 /// The shift of touch_in_cell() for two spheres that touch. Unless the sum of the radii is half a
 /// length, the image that touches is the nearest one along each axis.

@@ -132,7 +132,7 @@ std::uint64_t ArrayCollider::find_periodic_in_systems(const SphereArrays& sphere
   detail::check_number_of_cells(cells.size(), offsets);
   const std::uint64_t found =
       impl_->find_in_systems(spheres, offsets, cells, result, both_orders, stream);
-  impl_->is_periodic = true;  // also without systems
+  impl_->is_periodic = true;
   return found;
 }
 

@@ -110,7 +110,7 @@ std::optional<std::uint64_t> ArraySearch::search_to(const SphereInput& input,
     if (found.is_complete) return found.contacts;
     allocate_for(user, [&] {
       out->reserve_geometric(pool, stream.get(), found.contacts, "contacts");
-      collider.reserve(input.n, out->capacity(), input.periodic.known != nullptr);
+      collider.reserve(input.n, out->capacity(), input.is_periodic());
     });
   }
 }
@@ -127,8 +127,7 @@ std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput& inpu
     const PolledCount found = search_and_poll(input, output, user);
     if (!found.is_valid) return {};
     if (found.is_complete || found.contacts > capacity) return found.contacts;
-    allocate_for(
-        user, [&] { collider.reserve(input.n, found.contacts, input.periodic.known != nullptr); });
+    allocate_for(user, [&] { collider.reserve(input.n, found.contacts, input.is_periodic()); });
   }
 }
 

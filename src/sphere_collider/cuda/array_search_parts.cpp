@@ -157,7 +157,6 @@ std::uint64_t ArraySearch::find_in_systems(std::span<const std::uint64_t> from,
                 .cells = periodic_cells.data(),
                 .offsets = offsets.data(),
                 .systems = systems};
-    is_periodic = true;
     const bool fit = std::all_of(own_cells.begin(), own_cells.end(), [](const PeriodicCell& cell) {
       return detail::fits(cell, 0);  // also those of empty systems
     });
@@ -169,7 +168,7 @@ std::uint64_t ArraySearch::find_in_systems(std::span<const std::uint64_t> from,
     wait();
     const ContactCount& count = *counts.data();
     if (count.first_invalid != kNoSphere) {
-      if (is_periodic) check_periodic(spheres.data(), own_cells, from, stream.get());
+      if (!own_cells.empty()) check_periodic(spheres.data(), own_cells, from, stream.get());
       reject(count.first_invalid, stream.get());
     }
     if (count.complete != 0) return keep(count.contacts);

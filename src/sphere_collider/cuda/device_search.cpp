@@ -129,8 +129,7 @@ void DeviceSearch::find(const SphereInput& input, const SearchOutput& output, cu
   require_words(output.contacts, "contacts");
   require_words(output.pairs, "pairs");
   const DeviceGuard guard(device_);
-  const bool is_periodic = input.periodic.known != nullptr;
-  if ((uses_grid(input.n) || is_periodic) && input.n > 0) {
+  if ((uses_grid(input.n) || input.is_periodic()) && input.n > 0) {
     find_in_grid(input, output, stream);
   } else if (has_fused_ && input.n <= kFusedSpheres) {
     launch_fused_search({input, output}, stream);

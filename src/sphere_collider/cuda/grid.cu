@@ -319,14 +319,14 @@ bool is_in_one_launch(std::size_t n) { return n <= kMaxInOneLaunch; }
 
 void launch_grid_search(const GridArgs& args, const SearchOutput& output, const GridLimits& limits,
                         cudaStream_t stream) {
-  const bool is_periodic = args.input.periodic.known != nullptr;
-  if (is_periodic ? args.input.periodic.is_one_launch : is_in_one_launch(args.input.n)) {
+  if (args.input.is_periodic() ? args.input.periodic.is_one_launch
+                               : is_in_one_launch(args.input.n)) {
     launch_in_one(args, output, limits.resident_blocks, stream);
   } else {
     GridArgs phased = args;
     phased.table.coarse_buckets =
         std::clamp(std::bit_ceil(args.input.n / kSpheresOfCoarse), kFewestCoarse, kCoarseBuckets);
-    if (is_periodic) {
+    if (args.input.is_periodic()) {
       launch_phases<true>(phased, output, limits, stream);
     } else {
       launch_phases<false>(phased, output, limits, stream);

@@ -1,7 +1,7 @@
 /// Cells of the grid search: a hierarchy of unbounded grids, hashed by row.
 #pragma once
 
-#include <jfpx/contact.hpp>
+#include "src/sphere_collider/periodic_cell.hpp"
 
 #include <bit>
 #include <cstdint>
@@ -24,9 +24,7 @@ inline constexpr int kLastLevel = 31;
 /// neighboring cells are distinct. In double the limit is lower, because cell indices have 32 bits.
 inline constexpr Real kMaxCells =
     std::numeric_limits<Real>::digits == 24 ? Real(1 << 22) : Real(1 << 29);
-/// Squares of shorter lengths underflow, and no narrower cell is needed: 2^-73, in double 2^-536.
-inline constexpr Real kShortest =
-    std::numeric_limits<Real>::digits == 24 ? Real(0x1p-73) : Real(0x1p-536);
+using detail::kShortest;  // no narrower cell is needed
 
 /// Half the cell width that a radius requires.
 JFPX_HD inline Real half_cell_for_radius(Real radius) {

@@ -216,8 +216,7 @@ void launch_in_one(const GridArgs& args, const SearchOutput& output, unsigned ma
   config.stream = stream;
   config.attrs = &cooperative;
   config.numAttrs = 1;
-  Kernel* const kernel =
-      args.input.periodic.known != nullptr ? grid_search<true> : grid_search<false>;
+  Kernel* const kernel = args.input.is_periodic() ? grid_search<true> : grid_search<false>;
   JFPX_CUDA_TRY(cudaLaunchKernelEx(&config, kernel, shared_out, output));
 }
 

@@ -15,8 +15,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Properties of all spheres. All bytes are zero before a search; its last kernel clears them for
-/// the next one.
+/// Properties of all spheres. All bytes are zero before launch_prepare(), which clears them at its
+/// end for the next search.
 struct PeriodicState {
   unsigned long long largest_radius;  ///< bits of the largest radius of the given spheres
   unsigned long long images;          ///< number of images, including those beyond the capacity

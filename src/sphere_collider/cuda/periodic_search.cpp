@@ -80,7 +80,7 @@ PeriodicSearch::Images PeriodicSearch::wait(cudaStream_t stream) {
 SphereInput PeriodicSearch::input_on_device() const {
   // Where the sum of the radii of reduced spheres exceeds their distance by `least`, apart from
   // roundings, the given spheres touch: see doubt_of().
-  const Real least = 2 * args_.errors.margin + args_.errors.distance + detail::kNegligible;
+  const Real least = 2 * args_.errors.margin + args_.errors.distance + detail::kShortest;
   return {.spheres = reduced_.data(),
           .n = args_.n + args_.capacity,
           .periodic = {.known = known_.data(),

@@ -72,6 +72,7 @@ struct SphereInput {
   std::uint32_t n = 0;
   SphereArrays arrays = {};
   PeriodicInput periodic = {};
+  JFPX_HD bool is_periodic() const { return periodic.known != nullptr; }
   /// Number of spheres that have a row of contacts: images have none.
   JFPX_HD std::uint32_t rows() const { return n < periodic.spheres ? n : periodic.spheres; }
 };
