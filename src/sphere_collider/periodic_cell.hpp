@@ -199,9 +199,8 @@ JFPX_HD inline PairResult touch_at(const SphereInstance& a, const SphereInstance
 
 /// A pair of spheres that touches in a cell.
 struct ImageTouch {
-  PairResult pair;   ///< by touch_at()
-  ImageShift shift;  ///< of the given centres
-  ImageShift code;   ///< of the reduced centres: -1, 0 or 1 along each axis
+  PairResult pair;  ///< by touch_at()
+  ImageShift shift;
 };
 
 /// Tests two spheres in a cell. If they touch through several images, the result is that with the
@@ -236,16 +235,20 @@ JFPX_HD inline ImageTouch touch_in_cell(const SphereInstance& a, const SphereIns
       if (!near[1][j]) continue;
       for (int k = 0; k < 3; ++k) {
         if (!near[2][k]) continue;
-        ImageTouch result{{}, {}, {i - 1, j - 1, k - 1}};
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          result.shift[axis] = between[axis] + result.code[axis];
-        }
-        result.pair = touch_at(a, b, result.shift, cell);
-        if (result.pair.touching != 0) return result;
+        const ImageShift shift{between[0] + i - 1, between[1] + j - 1, between[2] + k - 1};
+        const PairResult pair = touch_at(a, b, shift, cell);
+        if (pair.touching != 0) return {pair, shift};
       }
     }
   }
   return {};
+}
+
+/// The shift of the image of b that is nearest to a, for reduced coordinates.
+/// @param difference a - b
+JFPX_HD inline std::int32_t nearest_shift(Real difference, Real length) {
+  const Real half = length / 2;
+  return difference > half ? 1 : difference < -half ? -1 : 0;
 }
 
 /// Whether two spheres may touch through two images, which are half a length away on both sides.
@@ -261,13 +264,12 @@ JFPX_HD inline ImageShift shift_of_touching(const SphereInstance& a, const Spher
   for (int k = 0; k < 3; ++k) {
     const auto axis = static_cast<std::size_t>(k);
     if (!cell.repeats[axis]) continue;
-    const Real length = cell.lengths[k], half = length / 2;
+    const Real length = cell.lengths[k];
     if (may_touch_twice(a.radius + b.radius, length)) return touch_in_cell(a, b, cell).shift;
     Real x = a.centre[k], y = b.centre[k];
     result[axis] = reduce(&x, length);
     result[axis] -= reduce(&y, length);
-    const Real difference = x - y;
-    result[axis] += difference > half ? 1 : difference < -half ? -1 : 0;
+    result[axis] += nearest_shift(x - y, length);
   }
   return result;
 }

@@ -179,7 +179,7 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       plan.single = dense && scale.last_level == 0;
       plan.equal_radii = state.largest_half == ~state.smallest_half;
       // In a periodic cell, only pairs of equal spheres can be tested relative to a common origin.
-      const bool is_decidable = plan.equal_radii || args.input.periodic.known == nullptr;
+      const bool is_decidable = plan.equal_radii || !args.input.is_periodic();
       const Real per_cube =
           x_cells * static_cast<Real>(args.input.n) / static_cast<Real>(all_cells);
       const bool is_crowded = plan.single && is_decidable && per_cube > kCrowded &&

@@ -14,8 +14,6 @@ inline constexpr unsigned kCandidates = 128;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
 /// Largest number of neighbors that a lane keeps.
 inline constexpr unsigned kMaxOfLane = 19;
-/// Largest number of neighbors of all queries that are staged.
-inline constexpr unsigned kMaxOfWarp = 640;
 inline constexpr unsigned kSorted = 8;  // neighbors that a lane sorts in registers
 /// Largest number of cells in y or z around the spheres of one cell c. A search radius is one cell
 /// wide. Coordinates have at most kMaxCells cells, so a sum is rounded by at most 1/4 cell, and so
@@ -32,9 +30,9 @@ struct CrowdedStorage {
   };
   union {
     Candidates candidates;
-    std::uint32_t rows[kMaxOfWarp];  // after the search: the b's of all queries
+    std::uint32_t rows[32 * kMaxOfLane];  // after the search: the b's of all queries
   };
-  std::uint32_t found[kMaxOfLane * 32];  // lane l has the elements l, l + 32, l + 64, ...
+  std::uint32_t found[32 * kMaxOfLane];  // lane l has the elements l, l + 32, l + 64, ...
 };
 
 /// Finds the neighbors b > a of each sphere a, and stages them like SingleLevelSearcher.
@@ -252,20 +250,17 @@ class CrowdedSearcher {
     const bool is_doubtful = kPeriodic && is_in_query(is_doubtful_);
     const bool is_known = is_query && !is_doubtful && (is_kept || !is_short);
     const bool is_last = part() == kLanesOfQuery - 1;
-    std::uint32_t kept = is_known && is_short ? length : 0;
+    const std::uint32_t kept = is_known && is_short ? length : 0;
     const std::uint32_t sum = warp_inclusive_sum(is_last ? kept : 0);
     const std::uint32_t start = is_last ? sum - kept : sum;  // of the row of the query
-    const bool fits = start + kept <= kMaxOfWarp;            // if not, no later row fits
-    if (!fits) kept = 0;
-    if (is_query && !(is_known && fits) && part() == 0) list_row_again(args_, position + query());
-    const auto all = static_cast<std::uint32_t>(
-        highest_of_warp(kept != 0 ? static_cast<std::int32_t>(start + kept) : 0));
+    if (is_query && !is_known && part() == 0) list_row_again(args_, position + query());
+    const std::uint32_t all = __shfl_sync(kFullWarp, sum, 31);
     unsigned long long index = 0;
     if (lane_id() == 0) {
       index = atomicAdd(&args_.state->contacts, static_cast<unsigned long long>(all));
     }
     index = __shfl_sync(kFullWarp, index, 0);
-    if (is_last && is_known && fits) {
+    if (is_last && is_known) {
       record_row(args_, id_, position + query(), length, index + start);
     }
     if (index + all > args_.rows.capacity) return;

@@ -152,10 +152,9 @@ __device__ ImageShift shift_of_points(const CellPoint& p, const CellPoint& q,
     const auto axis = static_cast<std::size_t>(k);
     if (!cell.repeats[axis]) continue;
     const std::int32_t of_p = unpacked(p, cell, k), of_q = unpacked(q, cell, k);
-    const Real length = cell.lengths[k], half = length / 2,
-               x = fused(-static_cast<Real>(of_p), length, p.centre[k]),
-               y = fused(-static_cast<Real>(of_q), length, q.centre[k]), difference = x - y;
-    result[axis] = of_p - of_q + (difference > half ? 1 : difference < -half ? -1 : 0);
+    const Real length = cell.lengths[k], x = detail::displaced(p.centre[k], of_p, length),
+               y = detail::displaced(q.centre[k], of_q, length);
+    result[axis] = of_p - of_q + detail::nearest_shift(x - y, length);
   }
   return result;
 }
@@ -194,12 +193,10 @@ __global__ void __launch_bounds__(kListThreads)
   const bool is_general = in.known == nullptr || in.known->may_touch_twice;
   for (std::size_t first = kOfThread * (first_element() - lane_id()); first < n;
        first += kOfThread * element_stride()) {
-    SpherePair pairs[kOfThread];
-#pragma unroll
-    for (unsigned k = 0; k < kOfThread; ++k) {
+    const auto pair = [&](unsigned k) {
       const std::size_t i = first + 32 * k + lane_id();
-      pairs[k] = pair_at(found, i < n ? i : n - 1);
-    }
+      return pair_at(found, i < n ? i : n - 1);
+    };
     const auto put = [&](unsigned k, const ImageShift& shift, std::int32_t sign) {
       for (unsigned axis = 0; axis < 3; ++axis) {
         mine[3 * (32 * k + lane_id()) + axis] = sign * shift[axis];
@@ -208,11 +205,13 @@ __global__ void __launch_bounds__(kListThreads)
     if (is_general) {
 #pragma unroll 1
       for (unsigned k = 0; k < kOfThread; ++k) {
-        const std::size_t i = first + 32 * k + lane_id();
-        const auto [a, b] = pair_at(found, i < n ? i : n - 1);
+        const auto [a, b] = pair(k);
         put(k, shift_of_pair(in, min(a, b), max(a, b)), a < b ? 1 : -1);
       }
     } else {
+      SpherePair pairs[kOfThread];
+#pragma unroll
+      for (unsigned k = 0; k < kOfThread; ++k) pairs[k] = pair(k);
       CellPoint points[kOfThread][2];
 #pragma unroll
       for (unsigned k = 0; k < kOfThread; ++k) {

@@ -53,7 +53,7 @@ __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInst
       continue;
     }
     const Real length = known.cell.lengths[k], displaced = image[k] - reduced[b].centre[k];
-    std::int32_t shift = displaced > length / 2 ? 1 : displaced < -length / 2 ? -1 : 0;
+    std::int32_t shift = detail::nearest_shift(displaced, length);
     if (k == lower) {
       if (shift < 0) return false;  // no such image
       --shift;

@@ -61,6 +61,14 @@ TEST_F(Cuda, FewCrowdedSpheres) {
   auto gas = make_gas((1 << 18) + 1, Real(0.5), 14, random);
   for (std::size_t i = 0; i < 50; ++i) gas[999 * i].centre = gas[7].centre;  // a long row
   expect_cpu_contacts(gas, SphereAlgorithm::automatic, "gas with coincident spheres");
+  // Rows that a few lanes keep, that are longer than a row of the staging buffer, and far longer.
+  auto dense = make_gas((1 << 18) + 1, Real(0.5), 45, random);
+  std::size_t from = 0;
+  for (const std::size_t group : {60u, 100u, 300u}) {
+    const Vec3 centre = dense[from].centre;
+    for (std::size_t i = 0; i < group; ++i, ++from) dense[501 * from].centre = centre;
+  }
+  expect_cpu_contacts(dense, SphereAlgorithm::automatic, "dense gas with coincident spheres");
 }
 
 TEST_F(Cuda, FewCrowdedSpheresThatTouchExactly) {

@@ -305,9 +305,11 @@ TEST_F(Cuda, ASearchOnAStreamLeavesContactsOnTheDevice) {
 
 TEST_F(Cuda, TooLittleRoomIsCountedExactlyAndNothingIsWritten) {
   for (const SphereAlgorithm algorithm : kAlgorithms) {
-    for (const std::size_t n : {700, 3000}) {
-      Random random(base_seed());
-      const auto spheres = sphere_kind("uniform").make(n, random);
+    Random random(base_seed());
+    for (const Spheres& spheres :
+         {sphere_kind("uniform").make(700, random), sphere_kind("uniform").make(3000, random),
+          make_gas(3000, Real(0.5), 20, random), make_gas(3000, Real(0.5), 60, random)}) {
+      const std::size_t n = spheres.size();
       const auto expected = brute_force(spheres);
       DeviceData data(spheres, expected.size());
       const SphereContact canary{7, 8, {1, 2, 3}, 4};

@@ -91,12 +91,25 @@ TEST_F(Cuda, FewArraysInAPeriodicCellHaveTheContactsOfTheHost) {
   }
 }
 
+/// @param fewest contacts that the test expects
+void expect_contacts_of_host(ArrayCollider& collider, const Spheres& spheres,
+                             const PeriodicCell& cell, std::size_t fewest) {
+  const OwnedStream stream(0);
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const auto expected = find_periodic_contacts(*cpu, spheres, cell);
+  ASSERT_GT(expected.size(), fewest);
+  const DeviceSpheres arrays(spheres);
+  ASSERT_EQ(
+      collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
+      expected.size())
+      << seed_note();
+  EXPECT_TRUE(periodic_of(collider, expected.size(), stream.get()) == expected) << seed_note();
+}
+
 /// Cells that are so large that the reduction to the cell and the images are inexact.
 TEST_F(Cuda, FewArraysInALargePeriodicCellHaveTheContactsOfTheHost) {
   Random random(base_seed());
-  const OwnedStream stream(0);
   ArrayCollider collider;
-  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
   for (const Real length : {Real(100), Real(1e4), Real(1e6), Real(1e8), Real(1e11)}) {
     const PeriodicCell cell{{length, length * Real(1.3), length * Real(0.7)}};
     Spheres spheres(500);
@@ -108,15 +121,8 @@ TEST_F(Cuda, FewArraysInALargePeriodicCellHaveTheContactsOfTheHost) {
       }
       s.radius = random.uniform(Real(0.1), Real(0.6));
     }
-    const DeviceSpheres arrays(spheres);
-    const auto expected = find_periodic_contacts(*cpu, spheres, cell);
-    ASSERT_GT(expected.size(), 100u);
-    ASSERT_EQ(
-        collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
-        expected.size())
-        << length << ", " << seed_note();
-    EXPECT_EQ(periodic_of(collider, expected.size(), stream.get()), expected)
-        << length << ", " << seed_note();
+    SCOPED_TRACE(length);
+    expect_contacts_of_host(collider, spheres, cell, 100);
   }
 }
 
@@ -136,21 +142,6 @@ Spheres gas_with(const PeriodicCell& cell, std::size_t n, double neighbors, Real
     s.radius = static_cast<Real>(cutoff) / 2 * (ratio > 1 ? random.uniform(1 / ratio, 1) : 1);
   }
   return spheres;
-}
-
-/// @param fewest contacts that the test expects
-void expect_contacts_of_host(ArrayCollider& collider, const Spheres& spheres,
-                             const PeriodicCell& cell, std::size_t fewest) {
-  const OwnedStream stream(0);
-  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
-  const auto expected = find_periodic_contacts(*cpu, spheres, cell);
-  ASSERT_GT(expected.size(), fewest);
-  const DeviceSpheres arrays(spheres);
-  ASSERT_EQ(
-      collider.find_periodic(arrays.arrays(), cell, ArrayResult::contacts, false, stream.get()),
-      expected.size())
-      << seed_note();
-  EXPECT_TRUE(periodic_of(collider, expected.size(), stream.get()) == expected) << seed_note();
 }
 
 struct PeriodicGas {
