@@ -38,7 +38,7 @@ class HostGroupSolver final : public GroupSolver {
       in.rolling_frictions = take(rolling_frictions_, size.contacts);
       in.rolling_friction_rows =
           take(rolling_friction_rows_,
-               size.rolling_frictions * rows::kRollingFrictionRows * rows::kFrictionFields);
+               size.rolling_frictions * rows::kRollingRows * rows::kRollingFields);
     }
     in.schedule = take(schedule_, size.contacts);
     in.slot_contacts = take(slot_contacts_, size.contacts);

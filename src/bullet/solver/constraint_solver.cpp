@@ -77,10 +77,6 @@ void ConstraintSolver::Impl::set_up(std::span<btPersistentManifold* const> manif
     scan.run(pool(), manifolds, flags);
     set_up_unlisted_bodies(manifolds);
   }
-  if (!scan.any_rolling()) return;
-  // Bullet's function for rolling friction rows also needs a solver body for the fixed body.
-  btSolverBody& fixed = self.m_tmpSolverBodyPool.expandNonInitializing();
-  self.initSolverBody(&fixed, nullptr, settings.dt);
 }
 
 rows::RowSweepReport ConstraintSolver::Impl::solve_rows() {
@@ -102,10 +98,7 @@ DeviceGroup ConstraintSolver::Impl::device_group() {
           .settings = settings,
           .bodies = solver.bodies(),
           .directions = directions(),
-          .factors = factors,
-          .set_up_rolling_friction = [this](const ContactRef& contact, Real* to) {
-            set_up_rolling_friction(contact, to, 1);
-          }};
+          .factors = factors};
 }
 
 rows::RowSweepReport ConstraintSolver::Impl::sweep() {

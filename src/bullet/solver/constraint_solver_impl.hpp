@@ -83,8 +83,9 @@ struct ConstraintSolver::Impl {
   void set_up_contacts();
   void prefetch_block(std::uint32_t block) const;
   void set_up_block(std::uint32_t block);
-  void set_up_rolling_frictions();
-  void set_up_rolling_friction(const ContactRef& contact, Real* to, std::size_t lanes);
+  bool has_rolling_friction(std::uint32_t block) const;
+  void set_up_rolling_frictions(std::uint32_t block, const cpu::RowSolver::BlockIds& ids,
+                                const Real* normals);
 
   // constraint_solver.cpp
   void set_up(std::span<btPersistentManifold* const> manifolds);

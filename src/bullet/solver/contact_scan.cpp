@@ -17,13 +17,22 @@ bool has_infinite_mass(const btRigidBody& body) {
   const btScalar inverse = body.getInvMass();
   return (btVector3(inverse, inverse, inverse) * body.getLinearFactor()).fuzzyZero();
 }
-bool is_anisotropic(const btCollisionObject& object) {
-  return object.hasAnisotropicFriction(btCollisionObject::CF_ANISOTROPIC_FRICTION);
+/// The BodyFlag bits of the anisotropic friction of a body.
+unsigned anisotropy_of(const btCollisionObject& object) {
+  unsigned flags = 0;
+  if (object.hasAnisotropicFriction(btCollisionObject::CF_ANISOTROPIC_FRICTION)) {
+    flags |= kAnisotropic;
+  }
+  if (object.hasAnisotropicFriction(btCollisionObject::CF_ANISOTROPIC_ROLLING_FRICTION)) {
+    flags |= kAnisotropicRolling;
+  }
+  return flags;
 }
 
 struct Side {
   std::int32_t id;
-  bool infinite_mass, anisotropic;
+  bool infinite_mass;
+  unsigned anisotropy;  ///< BodyFlag bits
 };
 
 Side side_of(btCollisionObject* object, std::span<const std::uint8_t> flags) {
@@ -31,12 +40,11 @@ Side side_of(btCollisionObject* object, std::span<const std::uint8_t> flags) {
   if (companion >= 0) {
     const std::uint8_t flag = flags[static_cast<std::size_t>(companion) + 1];
     const std::int32_t id = companion + 1;
-    return {(flag & kImmovable) != 0 ? ~id : id, (flag & kInfiniteMass) != 0,
-            (flag & kAnisotropic) != 0};
+    return {(flag & kImmovable) != 0 ? ~id : id, (flag & kInfiniteMass) != 0, flag};
   }
   const btRigidBody* body = moving_body(object);
-  if (body == nullptr) return {rows::kFixedBody, true, is_anisotropic(*object)};
-  return {kUnlisted, has_infinite_mass(*body), is_anisotropic(*object)};
+  if (body == nullptr) return {rows::kFixedBody, true, anisotropy_of(*object)};
+  return {kUnlisted, has_infinite_mass(*body), anisotropy_of(*object)};
 }
 
 btCollisionObject* object_of(const btCollisionObject* object) {
@@ -61,8 +69,7 @@ std::uint8_t body_flags(const btRigidBody& body) {
   if (masses.isZero() && inertia[0].isZero() && inertia[1].isZero() && inertia[2].isZero()) {
     flags |= kImmovable;
   }
-  if (is_anisotropic(body)) flags |= kAnisotropic;
-  return static_cast<std::uint8_t>(flags);
+  return static_cast<std::uint8_t>(flags | anisotropy_of(body));
 }
 
 void ContactScan::run(ThreadPool& pool, std::span<btPersistentManifold* const> manifolds,
@@ -113,13 +120,16 @@ void ContactScan::scan(std::span<btPersistentManifold* const> manifolds, std::si
     const Side b = side_of(object_of(manifold->getBody1()), flags);
     unlisted |= a.id == kUnlisted || b.id == kUnlisted;
     if (a.infinite_mass && b.infinite_mass) continue;
+    const unsigned anisotropy = a.anisotropy | b.anisotropy;
+    const bool is_anisotropic = (anisotropy & kAnisotropic) != 0;
     for (int k = 0; k < points; ++k) {
       const btManifoldPoint& point = manifold->getContactPoint(k);
       if (!(point.getDistance() <= manifold->getContactProcessingThreshold())) continue;
       const bool rolls = point.m_combinedRollingFriction > 0;
       rolling |= rolls;
-      anisotropic |= a.anisotropic || b.anisotropic;
-      refs[count] = {manifold, k, a.anisotropic || b.anisotropic, rolls};
+      anisotropic |= is_anisotropic;
+      refs[count] = {manifold, k, is_anisotropic, rolls,
+                     rolls && (anisotropy & kAnisotropicRolling) != 0};
       pairs[count++] = {a.id, b.id};
     }
   }

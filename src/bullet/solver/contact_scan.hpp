@@ -16,16 +16,18 @@ namespace bullet {
 
 /// Properties of a body that the scan uses.
 enum BodyFlag : std::uint8_t {
-  kInfiniteMass = 1,  ///< the inverse mass is zero within Bullet's tolerance
-  kImmovable = 2,     ///< rows do not change its velocities
-  kAnisotropic = 4,   ///< has anisotropic friction
+  kInfiniteMass = 1,        ///< the inverse mass is zero within Bullet's tolerance
+  kImmovable = 2,           ///< rows do not change its velocities
+  kAnisotropic = 4,         ///< has anisotropic friction
+  kAnisotropicRolling = 8,  ///< has anisotropic rolling friction
 };
 
 struct ContactRef {
   btPersistentManifold* manifold;
   int point;
-  bool anisotropic;  ///< one of the bodies has anisotropic friction
-  bool rolling;      ///< the contact has rolling friction
+  bool anisotropic;          ///< one of the bodies has anisotropic friction
+  bool rolling;              ///< the contact has rolling friction
+  bool anisotropic_rolling;  ///< ... and one of the bodies has anisotropic rolling friction
 
   btManifoldPoint& get() const { return manifold->getContactPoint(point); }
 };

@@ -5,7 +5,10 @@
 
 #include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/solver/rolling_friction_rows.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
+#include "src/contact_solver/sequential_impulse/contact_rows.hpp"
+#include "src/contact_solver/sequential_impulse/scalar_lane.hpp"
 
 #include <LinearMath/btQuickprof.h>
 
@@ -176,13 +179,12 @@ void GpuIslandSolver::pack(const DeviceGroup& group) {
   });
   warm_ = warm && group.settings.warm_start;
   if (size.rolling_frictions > 0) {
-    constexpr std::size_t kRows = rows::kRollingFrictionRows * rows::kFrictionFields;
+    constexpr std::size_t kRows = rows::kRollingRows * rows::kRollingFields;
     std::fill_n(in.rolling_frictions, size.contacts, rows::kNoRollingFriction);
     pool.run(size.rolling_frictions, [&](std::size_t k) {
-      in.rolling_frictions[rolling_frictions_[k]] = static_cast<std::uint32_t>(k);
-      std::fill_n(in.rolling_friction_rows + k * kRows, kRows, Real(0));
-      group.set_up_rolling_friction(scan.contacts()[rolling_frictions_[k]],
-                                    in.rolling_friction_rows + k * kRows);
+      const std::uint32_t contact = rolling_frictions_[k];
+      in.rolling_frictions[contact] = static_cast<std::uint32_t>(k);
+      set_up_rolling_friction(group, contact, in.rolling_friction_rows + k * kRows);
     });
   }
   split_impulse_count_ = group.settings.split
@@ -190,6 +192,18 @@ void GpuIslandSolver::pack(const DeviceGroup& group) {
                                                 split_impulse_candidates_, size.bodies,
                                                 in.split_impulse_schedule, in.split_impulse_counts)
                              : 0;
+}
+
+void GpuIslandSolver::set_up_rolling_friction(const DeviceGroup& group, std::uint32_t contact,
+                                              Real* to) {
+  const ContactRef& ref = group.scan.contacts()[contact];
+  const rows::RowPair pair = group.scan.pairs()[contact];
+  const std::int32_t ids[2] = {pair.a, pair.b};
+  std::fill_n(to, rows::kRollingRows * rows::kRollingFields, Real(0));
+  pack_rolling_friction(ref.get(), 1, to);
+  rows::set_up_rolling_axes<rows::OneLane>(ref.get().m_normalWorldOnB.m_floats, to);
+  if (ref.anisotropic_rolling) scale_rolling_axes(ref, 1, to);
+  rows::set_up_rolling_frictions<rows::OneLane>(group.host.body(0), ids, to);
 }
 
 /// @return whether any contact has an initial impulse

@@ -34,9 +34,6 @@ struct DeviceGroup {
   std::size_t bodies;
   std::uint32_t directions;  ///< number of friction directions
   bool factors;
-  /// Sets up the kRollingFrictionRows rows of a contact with rolling friction. Called by several
-  /// threads.
-  std::function<void(const ContactRef&, Real* rows)> set_up_rolling_friction;
 };
 
 /// Solves groups on a device: none (`cpu`), all supported groups (`cuda`), or groups for which the
@@ -84,6 +81,8 @@ class GpuIslandSolver {
   void pack(const DeviceGroup& group);
   bool pack_contacts(const DeviceGroup& group, const GroupInputs& in, std::size_t first,
                      std::size_t last);
+  /// @param to the kRollingRows rows of the contact
+  static void set_up_rolling_friction(const DeviceGroup& group, std::uint32_t contact, Real* to);
   std::size_t number_rolling_frictions(const ContactScan& scan);
   rows::RowSweepReport solve_packed(const DeviceGroup& group);
   static void write_back(const DeviceGroup& group, const rows::ContactOutcome& from,

@@ -21,8 +21,11 @@ void ConstraintSolver::Impl::set_up_rows() {
     BT_PROFILE("schedule contacts");
     solver.schedule(scan.pairs(), directions());
   }
+  if (scan.any_rolling()) {
+    solver.select_rolling_frictions(
+        [&](std::uint32_t block) { return has_rolling_friction(block); });
+  }
   set_up_contacts();
-  if (scan.any_rolling()) set_up_rolling_frictions();
 }
 
 void ConstraintSolver::Impl::set_up_contacts() {
@@ -68,39 +71,39 @@ void ConstraintSolver::Impl::set_up_block(std::uint32_t block) {
   for (std::uint32_t k = 0; k < directions(); ++k) {
     solver.set_up_frictions(settings, block, ids, k, inputs);
   }
+  if (has_rolling_friction(block)) {
+    set_up_rolling_frictions(block, ids, inputs + rows::kInNormal * lanes);
+  }
 }
 
-void ConstraintSolver::Impl::set_up_rolling_frictions() {
-  BT_PROFILE("set up rolling frictions");
-  const auto contact_in = [&](std::uint32_t block, std::size_t lane) -> const ContactRef* {
-    const std::uint32_t contact = solver.contacts_of(block)[lane];
-    return contact == cpu::RowSolver::kNoContact ? nullptr : &scan.contacts()[contact];
+bool ConstraintSolver::Impl::has_rolling_friction(std::uint32_t block) const {
+  if (!scan.any_rolling()) return false;
+  const std::uint32_t* const contacts = solver.contacts_of(block);
+  return std::any_of(contacts, contacts + solver.lanes(), [&](std::uint32_t contact) {
+    return contact != cpu::RowSolver::kNoContact && scan.contacts()[contact].rolling;
+  });
+}
+
+/// @param normals 3 fields
+void ConstraintSolver::Impl::set_up_rolling_frictions(std::uint32_t block,
+                                                      const cpu::RowSolver::BlockIds& ids,
+                                                      const Real* normals) {
+  const std::size_t lanes = solver.lanes();
+  const std::uint32_t* const contacts = solver.contacts_of(block);
+  Real* const rows = solver.rolling_friction_rows(block);
+  std::fill_n(rows, solver.rolling_numbers(), Real(0));
+  const auto for_each_contact = [&](const auto& f) {
+    for (std::size_t lane = 0; lane < lanes && contacts[lane] != cpu::RowSolver::kNoContact; ++lane)
+      f(scan.contacts()[contacts[lane]], rows + lane);
   };
-  solver.select_rolling_frictions([&](std::uint32_t block) {
-    for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
-      const ContactRef* contact = contact_in(block, lane);
-      if (contact != nullptr && contact->rolling) return true;
-    }
-    return false;
+  for_each_contact([&](const ContactRef& contact, Real* to) {
+    if (contact.rolling) pack_rolling_friction(contact.get(), lanes, to);
   });
-  pool().run(solver.rolling_friction_blocks().size(), [&](std::size_t k) {
-    const std::uint32_t block = solver.rolling_friction_blocks()[k];
-    for (std::uint32_t t = 0; t < cpu::kRollingFrictionRows; ++t) {
-      std::fill_n(solver.rolling_friction_rows(k, t), solver.lanes() * rows::kFrictionFields,
-                  Real(0));
-    }
-    for (std::size_t lane = 0; lane < solver.lanes(); ++lane) {
-      const ContactRef* contact = contact_in(block, lane);
-      if (contact == nullptr || !contact->rolling) continue;
-      set_up_rolling_friction(*contact, solver.rolling_friction_rows(k, 0) + lane, solver.lanes());
-    }
+  solver.set_up_rolling_axes(block, normals);
+  for_each_contact([&](const ContactRef& contact, Real* to) {
+    if (contact.anisotropic_rolling) scale_rolling_axes(contact, lanes, to);
   });
-}
-
-void ConstraintSolver::Impl::set_up_rolling_friction(const ContactRef& contact, Real* to,
-                                                     std::size_t lanes) {
-  const int fixed = self.m_tmpSolverBodyPool.size() - 1;  // see set_up()
-  bullet::set_up_rolling_frictions(self, fixed, settings.relaxation, contact, to, lanes);
+  solver.set_up_rolling_frictions(block, ids);
 }
 
 }  // namespace bullet

@@ -23,7 +23,6 @@ void ConstraintSolver::Impl::write_back() {
     self.writeBackJoints(0, self.m_tmpSolverNonContactConstraintPool.size(), *info);
     self.m_tmpSolverNonContactConstraintPool.resizeNoInitialize(0);
   }
-  if (scan.any_rolling()) self.m_tmpSolverBodyPool.pop_back();  // see set_up()
   write_back_bodies();
   self.m_tmpSolverBodyPool.resizeNoInitialize(0);
 }

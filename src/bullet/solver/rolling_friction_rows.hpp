@@ -1,10 +1,7 @@
-/// Rolling and spinning friction rows of a contact. Bullet's own function sets them up, because
-/// there are usually few.
+/// Anisotropic friction, and the inputs of rolling and spinning friction rows.
 #pragma once
 
 #include "src/bullet/solver/contact_scan.hpp"
-
-#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -14,13 +11,12 @@ namespace bullet {
 /// @param mode one of btCollisionObject::AnisotropicFrictionFlags
 void apply_anisotropic_friction(const ContactRef& contact, btVector3* axis, int mode);
 
-/// Sets up the nonzero rows among the kRollingFrictionRows rows of a contact. Thread-safe for
-/// different contacts.
-/// @param fixed index of the solver body that replaces all bodies without a solver body
-/// @param to    the lane of the contact in its rows, which are all 0
-void set_up_rolling_frictions(btSequentialImpulseConstraintSolver& solver, int fixed,
-                              btScalar relaxation, const ContactRef& contact, Real* to,
-                              std::size_t lanes);
+/// Writes the strengths of the rolling friction rows of a contact, and that it has these rows.
+/// @param to the lane of the contact in its rows
+void pack_rolling_friction(const btManifoldPoint& point, std::size_t lanes, Real* to);
+
+/// Applies anisotropic friction to the rolling axes of a contact, but not to its spinning axis.
+void scale_rolling_axes(const ContactRef& contact, std::size_t lanes, Real* to);
 
 }  // namespace bullet
 }  // namespace JFPX_ABI

@@ -87,9 +87,14 @@ struct BodyOf {
   V3 inertia[3];  ///< rows of the inverse inertia tensor
   typename S::Vec inverse_mass;
 
+  JFPX_ROW V3 inertia_times(const V3& torque) const {
+    return {dot(inertia[0], torque), dot(inertia[1], torque), dot(inertia[2], torque)};
+  }
+  JFPX_ROW V3 torque_response(const V3& torque) const {
+    return keep<S>(real, inertia_times(torque));
+  }
   JFPX_ROW V3 angular_response(const V3& torque) const {
-    const V3 delta = {dot(inertia[0], torque), dot(inertia[1], torque), dot(inertia[2], torque)};
-    return keep<S>(real, delta * angular_factor);
+    return keep<S>(real, inertia_times(torque) * angular_factor);
   }
   JFPX_ROW V3 velocity_at(const V3& arm) const {
     return keep<S>(real, linear + cross(angular, arm));
@@ -116,6 +121,11 @@ JFPX_ROW BodyOf<S> gather_body(const Real* bodies, const typename S::Id* ids) {
   b.inertia[1] = {f[24], f[25], f[26]};
   b.inertia[2] = {f[28], f[29], f[30]};
   return b;
+}
+
+template <class S>
+JFPX_ROW Vec3Of<S> normalized(const Vec3Of<S>& v) {
+  return v * (S::set(1) / S::square_root(dot(v, v)));
 }
 
 /// btPlaneSpace1(): two directions orthogonal to n and to each other.
@@ -210,8 +220,7 @@ JFPX_ROW typename S::Mask set_up_contact(const RowSettings& settings, const Real
 /// The second friction direction, if Bullet has not stored one yet.
 template <class S>
 JFPX_ROW Vec3Of<S> across(const Vec3Of<S>& direction, const Vec3Of<S>& normal) {
-  const Vec3Of<S> v = cross(direction, normal);
-  return v * (S::set(1) / S::square_root(dot(v, v)));
+  return normalized<S>(cross(direction, normal));
 }
 
 /// Second half of the setup: writes the friction row along the axis that the row contains.
@@ -251,79 +260,136 @@ JFPX_ROW void set_up_friction(const RowSettings& settings, const Real* in, const
   S::store(row + kRowImpulse * kLanes, zero);
 }
 
+/// First half of the setup of the rolling and spinning friction rows of a contact: writes their
+/// axes, which are the normal and two axes across it.
+/// @param normal as 3 fields
+template <class S>
+JFPX_ROW void set_up_rolling_axes(const Real* normal, Real* rows) {
+  constexpr int kLanes = S::kLanes;
+  const Vec3Of<S> n = load3<S>(normal);
+  Vec3Of<S> axes[kRollingRows] = {n, n, n};
+  plane_space<S>(n, &axes[1], &axes[2]);
+  for (std::uint32_t t = 0; t < kRollingRows; ++t) {
+    if (t > 0) axes[t] = normalized<S>(axes[t]);
+    store3<S>(rows + (t * kRollingFields + kRollingAxis) * kLanes, axes[t]);
+  }
+}
+
+/// Second half of the setup: writes the other fields from the axes, the strengths, and
+/// kRollingPresent of the first row, which holds for all of them.
+template <class S>
+JFPX_ROW void set_up_rolling_frictions(const Real* bodies, const typename S::Id* ids, Real* rows) {
+  constexpr int kLanes = S::kLanes;
+  using V3 = Vec3Of<S>;
+  // The largest number up to 0.001: an axis that anisotropic friction makes shorter has no row.
+  constexpr Real kLeastLength = sizeof(Real) == 4 ? Real(0x1.0624dcp-10) : Real(0.001);
+  const auto zero = S::set(0);
+  const V3 none = {zero, zero, zero};
+  const BodyOf<S> a = gather_body<S>(bodies, ids), b = gather_body<S>(bodies, ids + kLanes);
+  const auto rolls = S::load(rows + kRollingPresent * kLanes);
+  for (std::uint32_t t = 0; t < kRollingRows; ++t) {
+    Real* const row = rows + t * kRollingFields * kLanes;
+    const V3 axis = load3<S>(row + kRollingAxis * kLanes), opposite = -axis;
+    const auto is_long = S::less(S::set(kLeastLength), S::square_root(dot(axis, axis)));
+    const auto inverse = S::set(1) / (zero + dot(a.torque_response(opposite), opposite) +
+                                      dot(b.torque_response(axis), axis));
+    const auto velocity_a = dot(none, a.forced_linear) + dot(opposite, a.angular);
+    const auto velocity_b = dot(-none, b.forced_linear) + dot(axis, b.angular);
+    const auto put = [&](int field, typename S::Vec v) { S::store(row + field * kLanes, v); };
+    put(kRollingPresent, t == 0 ? rolls : S::keep(is_long, rolls));
+    store3<S>(row + kRollingAngularA * kLanes, a.angular_response(opposite));
+    store3<S>(row + kRollingAngularB * kLanes, b.angular_response(axis));
+    put(kRollingInverse, inverse);
+    put(kRollingRhs, (zero - (velocity_a + velocity_b)) * inverse);
+    put(kRollingImpulse, zero);
+  }
+}
+
+/// Which bodies of a row are moved by rows.
+template <bool kMovedA, bool kMovedB>
+struct MovedBodies {
+  static constexpr bool kA = kMovedA, kB = kMovedB;
+};
+using BothMoved = MovedBodies<true, true>;
+
 /// Delta velocities of the two bodies of a row, to which impulses are applied.
-template <class S, bool kFactors>
+/// @tparam Moved the bodies that rows move in any lane. The delta velocities of the others are 0.
+template <class S, bool kFactors, class Moved>
 struct BodyVelocities {
+  using V = typename S::Vec;
   using V3 = Vec3Of<S>;
   static constexpr int kLanes = S::kLanes;
+  struct Body {
+    V3 linear, angular;
+    V mass, pad;
+  };
   const typename S::Id* ids;
   Real* velocities;
   const Real* factors;
-  V3 linear_a, angular_a, linear_b, angular_b;
-  typename S::Vec mass_a, mass_b, pad_a, pad_b;
+  Body a, b;
 
   JFPX_ROW BodyVelocities(const typename S::Id* i, Real* v, const Real* f)
-      : ids(i), velocities(v), factors(f) {
-    typename S::Vec u[4];
-    S::gather4(v, ids, kVelocityFields, u);
-    linear_a = {u[0], u[1], u[2]}, mass_a = u[3];
-    S::gather4(v + 4, ids, kVelocityFields, u);
-    angular_a = {u[0], u[1], u[2]}, pad_a = u[3];
-    S::gather4(v, ids + kLanes, kVelocityFields, u);
-    linear_b = {u[0], u[1], u[2]}, mass_b = u[3];
-    S::gather4(v + 4, ids + kLanes, kVelocityFields, u);
-    angular_b = {u[0], u[1], u[2]}, pad_b = u[3];
-  }
+      : ids(i),
+        velocities(v),
+        factors(f),
+        a(load<Moved::kA>(i, v)),
+        b(load<Moved::kB>(i + kLanes, v)) {}
   /// Subtracts the velocity along the row, times inverse, in Bullet's order of operations.
-  JFPX_ROW typename S::Vec subtract_velocity(typename S::Vec impulse, typename S::Vec inverse,
-                                             const V3& axis_a, const V3& axis_b,
-                                             const V3& jacobian_a, const V3& jacobian_b) const {
-    const auto velocity_a = dot(axis_a, linear_a) + dot(jacobian_a, angular_a);
-    const auto velocity_b = dot(axis_b, linear_b) + dot(jacobian_b, angular_b);
+  JFPX_ROW V subtract_velocity(V impulse, V inverse, const V3& axis_a, const V3& axis_b,
+                               const V3& jacobian_a, const V3& jacobian_b) const {
+    const auto velocity_a = dot(axis_a, a.linear) + dot(jacobian_a, a.angular);
+    const auto velocity_b = dot(axis_b, b.linear) + dot(jacobian_b, b.angular);
     impulse = impulse - velocity_a * inverse;
     return impulse - velocity_b * inverse;
   }
-  /// Applies an impulse along the row in the active lanes and stores the velocities.
-  JFPX_ROW void apply_impulse(typename S::Vec impulse, const V3& axis_a, const V3& axis_b,
-                              const Real* row, typename S::Mask active) {
-    const V3 response_a = load3<S>(row + kRowAngularA * kLanes);
-    const V3 response_b = load3<S>(row + kRowAngularB * kLanes);
-    V3 new_linear_a, new_angular_a, new_linear_b, new_angular_b;
-    if constexpr (kFactors) {
-      add_with_factors(ids, axis_a, response_a, impulse, linear_a, angular_a, &new_linear_a,
-                       &new_angular_a);
-      add_with_factors(ids + kLanes, axis_b, response_b, impulse, linear_b, angular_b,
-                       &new_linear_b, &new_angular_b);
-    } else {
-      new_linear_a = linear_a + axis_a * mass_a * impulse;
-      new_angular_a = angular_a + response_a * impulse;
-      new_linear_b = linear_b + axis_b * mass_b * impulse;
-      new_angular_b = angular_b + response_b * impulse;
-    }
-    put(ids, select<S>(active, new_linear_a, linear_a), mass_a,
-        select<S>(active, new_angular_a, angular_a), pad_a);
-    put(ids + kLanes, select<S>(active, new_linear_b, linear_b), mass_b,
-        select<S>(active, new_angular_b, angular_b), pad_b);
+  /// Applies an impulse along a row in the active lanes.
+  /// @param response_a address of the angular velocity that a unit impulse adds to body a
+  JFPX_ROW void apply_impulse(V impulse, const V3& axis_a, const V3& axis_b, const Real* response_a,
+                              const Real* response_b, typename S::Mask active) {
+    if constexpr (Moved::kA) apply(ids, axis_a, load3<S>(response_a), impulse, active, &a);
+    if constexpr (Moved::kB) apply(ids + kLanes, axis_b, load3<S>(response_b), impulse, active, &b);
+  }
+  /// Stores the velocities of the bodies that rows move.
+  JFPX_ROW void store() const {
+    if constexpr (Moved::kA) put(ids, a);
+    if constexpr (Moved::kB) put(ids + kLanes, b);
   }
 
  private:
-  JFPX_ROW void add_with_factors(const typename S::Id* body, const V3& axis, const V3& response,
-                                 typename S::Vec impulse, const V3& linear, const V3& angular,
-                                 V3* new_linear, V3* new_angular) const {
-    typename S::Vec m[4], l[4], t[4];
-    S::gather4(factors, body, kFactorFields, m);
-    S::gather4(factors + 4, body, kFactorFields, l);
-    S::gather4(factors + 8, body, kFactorFields, t);
-    const V3 masses = {m[0], m[1], m[2]}, linear_factor = {l[0], l[1], l[2]};
-    const V3 angular_factor = {t[0], t[1], t[2]};
-    *new_linear = linear + axis * masses * impulse * linear_factor;
-    *new_angular = angular + response * (angular_factor * impulse);
+  template <bool kMoved>
+  JFPX_ROW static Body load(const typename S::Id* body, const Real* from) {
+    if constexpr (!kMoved) {
+      const auto zero = S::set(0);
+      return {{zero, zero, zero}, {zero, zero, zero}, zero, zero};
+    }
+    V u[4], w[4];
+    S::gather4(from, body, kVelocityFields, u);
+    S::gather4(from + 4, body, kVelocityFields, w);
+    return {{u[0], u[1], u[2]}, {w[0], w[1], w[2]}, u[3], w[3]};
   }
-  JFPX_ROW void put(const typename S::Id* body, const V3& linear, typename S::Vec mass,
-                    const V3& angular, typename S::Vec pad) const {
-    const typename S::Vec u[4] = {linear.x, linear.y, linear.z, mass};
-    const typename S::Vec w[4] = {angular.x, angular.y, angular.z, pad};
-    S::scatter8(velocities, body, kVelocityFields, u, w);
+  JFPX_ROW void apply(const typename S::Id* id, const V3& axis, const V3& response, V impulse,
+                      typename S::Mask active, Body* body) const {
+    V3 linear, angular;
+    if constexpr (kFactors) {
+      V m[4], l[4], t[4];
+      S::gather4(factors, id, kFactorFields, m);
+      S::gather4(factors + 4, id, kFactorFields, l);
+      S::gather4(factors + 8, id, kFactorFields, t);
+      const V3 masses = {m[0], m[1], m[2]}, linear_factor = {l[0], l[1], l[2]};
+      const V3 angular_factor = {t[0], t[1], t[2]};
+      linear = body->linear + axis * masses * impulse * linear_factor;
+      angular = body->angular + response * (angular_factor * impulse);
+    } else {
+      linear = body->linear + axis * body->mass * impulse;
+      angular = body->angular + response * impulse;
+    }
+    body->linear = select<S>(active, linear, body->linear);
+    body->angular = select<S>(active, angular, body->angular);
+  }
+  JFPX_ROW void put(const typename S::Id* id, const Body& body) const {
+    const V u[4] = {body.linear.x, body.linear.y, body.linear.z, body.mass};
+    const V w[4] = {body.angular.x, body.angular.y, body.angular.z, body.pad};
+    S::scatter8(velocities, id, kVelocityFields, u, w);
   }
 };
 
@@ -345,12 +411,12 @@ struct Residual {
 
 /// Solves a contact row or its split impulse against penetration, which use different fields and
 /// velocities.
-template <class S, bool kFactors, bool kSplitImpulse, class Sum>
+template <class S, bool kFactors, bool kSplitImpulse, class Moved = BothMoved, class Sum>
 JFPX_ROW void solve_contact(const typename S::Id* ids, Real* velocities, const Real* factors,
                             Real* row, Sum* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
-  BodyVelocities<S, kFactors> pair(ids, velocities, factors);
+  BodyVelocities<S, kFactors, Moved> pair(ids, velocities, factors);
   Real* const field = row + (kSplitImpulse ? kRowSplitImpulse : kRowImpulse) * kLanes;
   const auto before = S::load(field);
   const auto rhs = S::load(row + (kSplitImpulse ? kRowSplitRhs : kRowRhs) * kLanes);
@@ -366,77 +432,98 @@ JFPX_ROW void solve_contact(const typename S::Id* ids, Real* velocities, const R
   const auto pulls = S::less(sum, zero);
   impulse = S::select(pulls, zero - before, impulse);
   S::store(field, S::select(active, S::select(pulls, zero, sum), before));
-  pair.apply_impulse(impulse, axis_a, axis_b, row, active);
+  pair.apply_impulse(impulse, axis_a, axis_b, row + kRowAngularA * kLanes,
+                     row + kRowAngularB * kLanes, active);
+  pair.store();
   residual->add(impulse, inverse, active);
 }
 
-/// Solves a row whose impulse is limited to [-upper, upper], in the active lanes.
-template <class S, bool kFactors, class Sum>
-JFPX_ROW void solve_limited(const typename S::Id* ids, Real* velocities, const Real* factors,
-                            Real* row, const Vec3Of<S>& axis_a, const Vec3Of<S>& axis_b,
-                            typename S::Vec upper, typename S::Mask active, Sum* residual) {
-  constexpr int kLanes = S::kLanes;
-  BodyVelocities<S, kFactors> pair(ids, velocities, factors);
+/// A row whose impulse is limited.
+template <class S>
+struct LimitedRow {
+  Vec3Of<S> axis_a, axis_b, jacobian_a, jacobian_b;
+  const Real *response_a, *response_b;
+  typename S::Vec inverse, rhs;
+};
+
+/// Solves a row in the active lanes.
+/// @param field address of its impulse, which is limited to [-upper, upper]
+template <class S, class Pair, class Sum>
+JFPX_ROW void solve_limited(const LimitedRow<S>& row, typename S::Vec upper,
+                            typename S::Mask active, Real* field, Pair* pair, Sum* residual) {
   const auto lower = S::negate(upper);
-  const auto before = S::load(row + kRowImpulse * kLanes);
-  const auto inverse = S::load(row + kRowInverse * kLanes);
-  auto impulse = S::load(row + kRowRhs * kLanes) - before * S::set(0);
-  impulse = pair.subtract_velocity(impulse, inverse, axis_a, axis_b,
-                                   load3<S>(row + kRowAngularJacobianA * kLanes),
-                                   load3<S>(row + kRowAngularJacobianB * kLanes));
+  const auto before = S::load(field);
+  auto impulse = row.rhs - before * S::set(0);
+  impulse = pair->subtract_velocity(impulse, row.inverse, row.axis_a, row.axis_b, row.jacobian_a,
+                                    row.jacobian_b);
   const auto sum = before + impulse;
   const auto below = S::less(sum, lower), above = S::less(upper, sum);
   impulse = S::select(below, lower - before, S::select(above, upper - before, impulse));
   const auto after = S::select(below, lower, S::select(above, upper, sum));
-  S::store(row + kRowImpulse * kLanes, S::select(active, after, before));
-  pair.apply_impulse(impulse, axis_a, axis_b, row, active);
-  residual->add(impulse, inverse, active);
+  S::store(field, S::select(active, after, before));
+  pair->apply_impulse(impulse, row.axis_a, row.axis_b, row.response_a, row.response_b, active);
+  residual->add(impulse, row.inverse, active);
 }
 
 /// Solves a friction row, whose impulse is limited by that of its contact.
-template <class S, bool kFactors, class Sum>
+template <class S, bool kFactors, class Moved = BothMoved, class Sum>
 JFPX_ROW void solve_friction(const typename S::Id* ids, Real* velocities, const Real* factors,
                              const Real* contact, Real* row, Sum* residual) {
   constexpr int kLanes = S::kLanes;
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
   const auto active = S::less(S::set(0), pressure);
   if (!S::any(active)) return;
+  BodyVelocities<S, kFactors, Moved> pair(ids, velocities, factors);
   const auto axis = load3<S>(row + kRowAxis * kLanes);
-  solve_limited<S, kFactors>(ids, velocities, factors, row, keep<S>(S::is_real(ids), axis),
-                             keep<S>(S::is_real(ids + kLanes), -axis),
-                             S::load(row + kRowFriction * kLanes) * pressure, active, residual);
+  solve_limited<S>(
+      {keep<S>(S::is_real(ids), axis), keep<S>(S::is_real(ids + kLanes), -axis),
+       load3<S>(row + kRowAngularJacobianA * kLanes), load3<S>(row + kRowAngularJacobianB * kLanes),
+       row + kRowAngularA * kLanes, row + kRowAngularB * kLanes,
+       S::load(row + kRowInverse * kLanes), S::load(row + kRowRhs * kLanes)},
+      S::load(row + kRowFriction * kLanes) * pressure, active, row + kRowImpulse * kLanes, &pair,
+      residual);
+  pair.store();
 }
 
-/// Solves a rolling or spinning friction row: an angular impulse, limited by the impulse of its
-/// contact.
-template <class S, bool kFactors, class Sum>
-JFPX_ROW void solve_rolling_friction(const typename S::Id* ids, Real* velocities,
-                                     const Real* factors, const Real* contact, Real* row,
-                                     Sum* residual) {
+/// Solves the kRollingRows rolling and spinning friction rows of a contact: angular impulses that
+/// are limited by the impulse of the contact.
+template <class S, bool kFactors, class Moved = BothMoved, class Sum>
+JFPX_ROW void solve_rolling_frictions(const typename S::Id* ids, Real* velocities,
+                                      const Real* factors, const Real* contact, Real* rows,
+                                      Sum* residual) {
   constexpr int kLanes = S::kLanes;
   const auto zero = S::set(0);
   const auto pressure = S::load(contact + kRowImpulse * kLanes);
-  const auto active =
-      S::both(S::less(zero, pressure), S::less(zero, S::load(row + kRowPresent * kLanes)));
-  if (!S::any(active)) return;
-  const auto strength = S::load(row + kRowFriction * kLanes);
-  const auto limit = strength * pressure;
-  const auto upper = S::select(S::less(strength, limit), strength, limit);
-  const Vec3Of<S> axis_a = {zero, zero, zero};
-  const Vec3Of<S> axis_b = -axis_a;  // Bullet also multiplies by -axis
-  solve_limited<S, kFactors>(ids, velocities, factors, row, axis_a, axis_b, upper, active,
-                             residual);
+  const auto pressed = S::less(zero, pressure);
+  if (!S::any(pressed)) return;
+  BodyVelocities<S, kFactors, Moved> pair(ids, velocities, factors);
+  const Vec3Of<S> none = {zero, zero, zero};
+  for (std::uint32_t t = 0; t < kRollingRows; ++t) {
+    Real* const row = rows + t * kRollingFields * kLanes;
+    const auto active = S::both(pressed, S::less(zero, S::load(row + kRollingPresent * kLanes)));
+    if (!S::any(active)) continue;
+    const auto strength = S::load(row + kRollingStrength * kLanes), limit = strength * pressure;
+    const auto axis = load3<S>(row + kRollingAxis * kLanes);
+    solve_limited<S>({none, -none,  // Bullet also multiplies by -0
+                      -axis, axis, row + kRollingAngularA * kLanes, row + kRollingAngularB * kLanes,
+                      S::load(row + kRollingInverse * kLanes), S::load(row + kRollingRhs * kLanes)},
+                     S::select(S::less(strength, limit), strength, limit), active,
+                     row + kRollingImpulse * kLanes, &pair, residual);
+  }
+  pair.store();
 }
 
 /// Applies the initial impulses of the rows to the bodies.
-template <class S, bool kFactors>
+template <class S, bool kFactors, class Moved = BothMoved>
 JFPX_ROW void warm_start(const typename S::Id* ids, Real* velocities, const Real* factors,
                          const Real* row) {
   constexpr int kLanes = S::kLanes;
-  BodyVelocities<S, kFactors> pair(ids, velocities, factors);
+  BodyVelocities<S, kFactors, Moved> pair(ids, velocities, factors);
   const auto n = load3<S>(row + kRowAxis * kLanes);
   pair.apply_impulse(S::load(row + kRowImpulse * kLanes), keep<S>(S::is_real(ids), n),
-                     keep<S>(S::is_real(ids + kLanes), -n), row, S::always());
+                     keep<S>(S::is_real(ids + kLanes), -n), row + kRowAngularA * kLanes,
+                     row + kRowAngularB * kLanes, S::always());
+  pair.store();
 }
 
 }  // namespace rows

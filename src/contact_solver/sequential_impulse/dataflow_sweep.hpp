@@ -81,12 +81,12 @@ struct RowGroupArrays {
   const Real* factors;            ///< kFactorFields each; null if all are 1
   const Real* inputs;             ///< by contact, kInputFields each
   const std::uint32_t* contacts;  ///< by slot of `main`: index of the contact
-  /// By contact: index of its kRollingFrictionRows rows, or kNoRollingFriction; null if no contact
+  /// By contact: index of its kRollingRows rows, or kNoRollingFriction; null if no contact
   /// has rolling friction.
   const std::uint32_t* rolling_frictions;
   Real* contact_rows;           ///< by slot
   Real* friction_rows;          ///< by slot, then by direction
-  Real* rolling_friction_rows;  ///< kRollingFrictionRows * kFrictionFields each
+  Real* rolling_friction_rows;  ///< kRollingRows * kRollingFields each
   ContactOutcome* outcomes;     ///< by contact
   Real* velocities;  ///< by body: linear, angular, push, turn velocity; kOutcomeVelocities each
   std::uint32_t body_count, directions;
@@ -175,10 +175,9 @@ JFPX_ROW bool set_up_slot(const RowGroupArrays& group, std::uint32_t slot) {
   outcome.has_second = has_second ? 1 : 0;
   if (group.rolling_frictions != nullptr &&
       group.rolling_frictions[contact] != kNoRollingFriction) {
-    Real* rows = group.rolling_friction_rows + std::size_t{group.rolling_frictions[contact]} *
-                                                   kRollingFrictionRows * kFrictionFields;
-    for (std::uint32_t t = 0; t < kRollingFrictionRows; ++t)
-      rows[t * kFrictionFields + kRowImpulse] = 0;
+    Real* rows = group.rolling_friction_rows +
+                 std::size_t{group.rolling_frictions[contact]} * kRollingRows * kRollingFields;
+    for (std::uint32_t t = 0; t < kRollingRows; ++t) rows[t * kRollingFields + kRollingImpulse] = 0;
   }
   return row[kRowSplitRhs] != 0;
 }
@@ -379,12 +378,10 @@ class SweepWorker {
     if (index == kNoRollingFriction) return;
     Real contact[kRowImpulse + 1];
     contact[kRowImpulse] = pressure_;
-    Real* row =
-        group_.rolling_friction_rows + std::size_t{index} * kRollingFrictionRows * kFrictionFields;
-    for (std::uint32_t t = 0; t < kRollingFrictionRows; ++t, row += kFrictionFields) {
-      solve_rolling_friction<LocalLane, kFactors>(bodies_, velocities_, factors, contact, row,
-                                                  residual);
-    }
+    solve_rolling_frictions<LocalLane, kFactors>(
+        bodies_, velocities_, factors, contact,
+        group_.rolling_friction_rows + std::size_t{index} * kRollingRows * kRollingFields,
+        residual);
   }
   JFPX_ROW void load_factors(Real* factors) const {
     const std::int32_t ids[2] = {scheduled_.a, scheduled_.b};

@@ -25,10 +25,10 @@ struct GroupInputs {
   Real* bodies;    ///< kBodyFields each
   Real* factors;   ///< kFactorFields each; null if all factors are 1
   Real* contacts;  ///< kInputFields each
-  /// By contact: index of its kRollingFrictionRows rows, or kNoRollingFriction; null if no contact
+  /// By contact: index of its kRollingRows rows, or kNoRollingFriction; null if no contact
   /// has rolling friction.
   std::uint32_t* rolling_frictions;
-  Real* rolling_friction_rows;       ///< kRollingFrictionRows * kFrictionFields each
+  Real* rolling_friction_rows;       ///< kRollingRows * kRollingFields each
   rows::ScheduledContact* schedule;  ///< see RowOrder::build()
   std::uint32_t* slot_contacts;
   std::uint32_t* contact_counts;                   ///< by body

@@ -22,12 +22,23 @@ enum RowField : int {
   kRowImpulse = 17,          ///< accumulated impulse
   kRowFriction = 18,         ///< friction row: the coefficient
   kFrictionFields = 19,
-  // A rolling or spinning friction row has the layout of a friction row, except for its axis:
-  kRowPresent = 0,  ///< 1 if the contact has this row, else 0
-  kRowCfm = 18,     ///< contact row: constraint force mixing (softness)
+  kRowCfm = 18,  ///< contact row: constraint force mixing (softness)
   kRowSplitRhs = 19,
   kRowSplitImpulse = 20,  ///< accumulated split impulse, which corrects penetration
   kContactFields = 21,
+};
+
+/// A rolling or spinning friction row, which has no linear part.
+enum RollingField : int {
+  kRollingPresent = 0,   ///< 1 if the contact has this row, else 0
+  kRollingAxis = 1,      ///< 3 fields: the axis for body b; that for body a is opposite
+  kRollingAngularA = 4,  ///< 3 fields: angular velocity that a unit impulse adds to body a
+  kRollingAngularB = 7,  ///< 3 fields
+  kRollingInverse = 10,
+  kRollingRhs = 11,
+  kRollingImpulse = 12,
+  kRollingStrength = 13,  ///< coefficient, and limit of the impulse
+  kRollingFields = 14,
 };
 
 /// A contact point of a manifold, in the layout of rows.
@@ -76,7 +87,7 @@ struct RowSettings {
 
 /// Rolling and spinning friction rows per contact: one around the normal (spinning), and two around
 /// tangential axes (rolling).
-inline constexpr std::uint32_t kRollingFrictionRows = 3;
+inline constexpr std::uint32_t kRollingRows = 3;
 /// Upper limit of the lanes of a block, for all instruction sets.
 inline constexpr std::uint32_t kMaxLanes = 8;
 

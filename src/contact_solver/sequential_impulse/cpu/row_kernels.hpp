@@ -19,14 +19,21 @@ struct RowArrays {
   std::uint32_t directions;                   ///< friction rows per contact, in consecutive order
   const std::uint32_t* split_impulse_blocks;  ///< blocks with a row of the split impulse
   const std::uint32_t* rolling_friction_blocks;  ///< blocks with rolling or spinning friction
-  Real* rolling_frictions;                       ///< kRollingFrictionRows rows per such block
+  Real* rolling_frictions;                       ///< kRollingRows rows per block
 };
-
-using rows::kRollingFrictionRows;
 
 struct RowResidual {
   Real largest = 0;     ///< largest squared residual
   bool broken = false;  ///< whether a residual is NaN
+  bool is_exact = true;
+  Real enough = 0;  ///< unless `is_exact`, a larger residual ends the search for the largest one
+};
+
+/// What the setup of the contacts of a block found, with one bit per lane.
+struct ContactSetup {
+  unsigned has_second;  ///< whether there is a second friction direction
+  unsigned has_split;   ///< whether there is a split impulse
+  bool is_regular;      ///< no effective mass is 0, so that a residual is NaN only if an impulse is
 };
 
 /// Sweeps over the blocks [first, last) in their order.
@@ -36,12 +43,17 @@ using RowSweep = void (*)(const RowArrays& arrays, std::uint32_t first, std::uin
 struct RowKernels {
   unsigned lanes;
   /// Sets up the contacts of a block and their friction directions; see set_up_contact().
-  /// @return one bit per lane: whether `second` holds the second direction
-  unsigned (*set_up_contacts)(const rows::RowSettings& settings, const Real* inputs,
-                              const Real* bodies, const std::int32_t* ids, Real* contacts,
-                              Real* frictions, Real* second);
-  void (*set_up_frictions)(const rows::RowSettings& settings, const Real* inputs,
+  /// @param second receives the second directions
+  ContactSetup (*set_up_contacts)(const rows::RowSettings& settings, const Real* inputs,
+                                  const Real* bodies, const std::int32_t* ids, Real* contacts,
+                                  Real* frictions, Real* second);
+  /// @return whether no effective mass is 0
+  bool (*set_up_frictions)(const rows::RowSettings& settings, const Real* inputs,
                            const Real* bodies, const std::int32_t* ids, Real* frictions);
+  /// See rows::set_up_rolling_axes() and rows::set_up_rolling_frictions().
+  void (*set_up_rolling_axes)(const Real* normal, Real* rows);
+  /// @return whether no effective mass is 0
+  bool (*set_up_rolling_frictions)(const Real* bodies, const std::int32_t* ids, Real* rows);
   // Index 1: with factors.
   RowSweep warm_starts[2];
   RowSweep contacts[2];

@@ -9,7 +9,31 @@ namespace {
 
 constexpr std::uint32_t kLanes = Simd::kLanes;
 static_assert(kLanes <= rows::kMaxLanes);
-using BlockResidual = rows::Residual<Simd>;
+
+/// The largest residual of a sweep, or one that is large enough.
+struct BlockResidual {
+  rows::Residual<Simd> sum;
+  Real enough;
+  bool is_exact, is_enough;
+
+  explicit BlockResidual(const RowResidual& residual)
+      : enough(residual.enough),
+        is_exact(residual.is_exact),
+        is_enough(!is_exact && residual.largest > enough) {}
+  void add(Simd::Vec impulse, Simd::Vec inverse, Simd::Mask active) {
+    if (is_enough) return;
+    sum.add(impulse, inverse, active);
+    is_enough = !is_exact && Simd::any(Simd::less(Simd::set(enough), sum.largest));
+  }
+  void store(RowResidual* residual) const {
+    Real lanes[kLanes];
+    Simd::store(lanes, sum.largest);
+    for (const Real lane : lanes) {
+      if (lane > residual->largest) residual->largest = lane;
+    }
+    if (Simd::any(sum.broken)) residual->broken = true;
+  }
+};
 
 const std::int32_t* ids_of(const RowArrays& arrays, std::uint32_t block) {
   return arrays.ids + std::size_t{2} * kLanes * block;
@@ -20,31 +44,63 @@ Real* contact_of(const RowArrays& arrays, std::uint32_t block) {
 Real* friction_of(const RowArrays& arrays, std::uint32_t block) {
   return arrays.frictions + std::size_t{rows::kFrictionFields} * kLanes * arrays.directions * block;
 }
-void reduce(const BlockResidual& sum, RowResidual* residual) {
-  Real lanes[kLanes];
-  Simd::store(lanes, sum.largest);
-  for (const Real lane : lanes) {
-    if (lane > residual->largest) residual->largest = lane;
-  }
-  if (Simd::any(sum.broken)) residual->broken = true;
+/// Whether no lane of a field is 0.
+bool is_nonzero(const Real* field) {
+  return !Simd::any(Simd::negate_mask(Simd::differs(Simd::load(field), Simd::set(0))));
 }
 
-unsigned set_up_contacts(const rows::RowSettings& settings, const Real* inputs, const Real* bodies,
-                         const std::int32_t* ids, Real* contacts, Real* frictions, Real* second) {
-  return Simd::bits(
-      rows::set_up_contact<Simd>(settings, inputs, bodies, ids, contacts, frictions, second));
+ContactSetup set_up_contacts(const rows::RowSettings& settings, const Real* inputs,
+                             const Real* bodies, const std::int32_t* ids, Real* contacts,
+                             Real* frictions, Real* second) {
+  const auto has_second =
+      rows::set_up_contact<Simd>(settings, inputs, bodies, ids, contacts, frictions, second);
+  const auto split = Simd::load(contacts + rows::kRowSplitRhs * kLanes);
+  return {Simd::bits(has_second), Simd::bits(Simd::differs(split, Simd::set(0))),
+          is_nonzero(contacts + rows::kRowInverse * kLanes)};
 }
-void set_up_frictions(const rows::RowSettings& settings, const Real* inputs, const Real* bodies,
+bool set_up_frictions(const rows::RowSettings& settings, const Real* inputs, const Real* bodies,
                       const std::int32_t* ids, Real* frictions) {
   rows::set_up_friction<Simd>(settings, inputs, bodies, ids, frictions);
+  return is_nonzero(frictions + rows::kRowInverse * kLanes);
+}
+void set_up_rolling_axes(const Real* normal, Real* rows) {
+  rows::set_up_rolling_axes<Simd>(normal, rows);
+}
+bool set_up_rolling_frictions(const Real* bodies, const std::int32_t* ids, Real* rows) {
+  rows::set_up_rolling_frictions<Simd>(bodies, ids, rows);
+  bool is_regular = true;
+  for (std::uint32_t t = 0; t < rows::kRollingRows; ++t) {
+    is_regular &= is_nonzero(rows + (t * rows::kRollingFields + rows::kRollingInverse) * kLanes);
+  }
+  return is_regular;
 }
 
-template <bool kFactors>
+/// Whether rows move any of the bodies.
+bool moves_any(const std::int32_t* ids) {
+  std::int32_t all = -1;  // the sign is set if that of each id is
+  for (std::uint32_t lane = 0; lane < kLanes; ++lane) all &= ids[lane];
+  return all >= 0;
+}
+/// Calls f.operator()<Moved>() with the bodies of a block that rows move. The bodies on one side of
+/// most blocks are fixed, where a terrain or a floor is.
+template <class F>
+[[gnu::always_inline]] inline void visit_moved(const std::int32_t* ids, const F& f) {
+  if (!moves_any(ids)) {
+    f.template operator()<rows::MovedBodies<false, true>>();
+  } else if (!moves_any(ids + kLanes)) {
+    f.template operator()<rows::MovedBodies<true, false>>();
+  } else {
+    f.template operator()<rows::BothMoved>();
+  }
+}
+
+template <bool kFactors, class Moved>
 void solve_frictions(const RowArrays& arrays, std::uint32_t block, BlockResidual* sum) {
   Real* row = friction_of(arrays, block);
   for (std::uint32_t k = 0; k < arrays.directions; ++k) {
-    rows::solve_friction<Simd, kFactors>(ids_of(arrays, block), arrays.velocities, arrays.factors,
-                                         contact_of(arrays, block), row, sum);
+    rows::solve_friction<Simd, kFactors, Moved>(ids_of(arrays, block), arrays.velocities,
+                                                arrays.factors, contact_of(arrays, block), row,
+                                                sum);
     row += rows::kFrictionFields * kLanes;
   }
 }
@@ -53,73 +109,84 @@ template <bool kFactors>
 void sweep_warm_starts(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                        RowResidual*) {
   for (std::uint32_t i = first; i < last; ++i) {
-    rows::warm_start<Simd, kFactors>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                     contact_of(arrays, i));
+    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
+      rows::warm_start<Simd, kFactors, Moved>(ids_of(arrays, i), arrays.velocities, arrays.factors,
+                                              contact_of(arrays, i));
+    });
   }
 }
 template <bool kFactors>
 void sweep_contacts(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                     RowResidual* residual) {
-  BlockResidual sum;
+  BlockResidual sum(*residual);
   for (std::uint32_t i = first; i < last; ++i) {
-    rows::solve_contact<Simd, kFactors, false>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                               contact_of(arrays, i), &sum);
+    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
+      rows::solve_contact<Simd, kFactors, false, Moved>(
+          ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), &sum);
+    });
   }
-  reduce(sum, residual);
+  sum.store(residual);
 }
 template <bool kFactors>
 void sweep_frictions(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                      RowResidual* residual) {
-  BlockResidual sum;
+  BlockResidual sum(*residual);
   for (std::uint32_t i = first; i < last; ++i) {
-    solve_frictions<kFactors>(arrays, i, &sum);
+    visit_moved(ids_of(arrays, i),
+                [&]<class Moved>() { solve_frictions<kFactors, Moved>(arrays, i, &sum); });
   }
-  reduce(sum, residual);
+  sum.store(residual);
 }
 template <bool kFactors>
 void sweep_both(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                 RowResidual* residual) {
-  BlockResidual sum;
+  BlockResidual sum(*residual);
   for (std::uint32_t i = first; i < last; ++i) {
-    rows::solve_contact<Simd, kFactors, false>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                               contact_of(arrays, i), &sum);
-    solve_frictions<kFactors>(arrays, i, &sum);
+    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
+      rows::solve_contact<Simd, kFactors, false, Moved>(
+          ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), &sum);
+      solve_frictions<kFactors, Moved>(arrays, i, &sum);
+    });
   }
-  reduce(sum, residual);
+  sum.store(residual);
 }
 template <bool kFactors>
 void sweep_split_impulses(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                           RowResidual* residual) {
-  BlockResidual sum;
+  BlockResidual sum(*residual);
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = arrays.split_impulse_blocks[k];
-    rows::solve_contact<Simd, kFactors, true>(ids_of(arrays, i), arrays.push_velocities,
-                                              arrays.factors, contact_of(arrays, i), &sum);
+    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
+      rows::solve_contact<Simd, kFactors, true, Moved>(ids_of(arrays, i), arrays.push_velocities,
+                                                       arrays.factors, contact_of(arrays, i), &sum);
+    });
   }
-  reduce(sum, residual);
+  sum.store(residual);
 }
 
 template <bool kFactors>
 void sweep_rolling_frictions(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                              RowResidual* residual) {
-  BlockResidual sum;
+  BlockResidual sum(*residual);
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = arrays.rolling_friction_blocks[k];
-    Real* row = arrays.rolling_frictions +
-                std::size_t{rows::kFrictionFields} * kLanes * kRollingFrictionRows * k;
-    for (std::uint32_t t = 0; t < kRollingFrictionRows; ++t) {
-      rows::solve_rolling_friction<Simd, kFactors>(
-          ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), row, &sum);
-      row += rows::kFrictionFields * kLanes;
-    }
+    Real* const of_block = arrays.rolling_frictions +
+                           std::size_t{rows::kRollingRows * rows::kRollingFields} * kLanes * i;
+    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
+      rows::solve_rolling_frictions<Simd, kFactors, Moved>(ids_of(arrays, i), arrays.velocities,
+                                                           arrays.factors, contact_of(arrays, i),
+                                                           of_block, &sum);
+    });
   }
-  reduce(sum, residual);
+  sum.store(residual);
 }
 
 constexpr RowKernels kKernels = {
     kLanes,
     set_up_contacts,
     set_up_frictions,
+    set_up_rolling_axes,
+    set_up_rolling_frictions,
     {sweep_warm_starts<false>, sweep_warm_starts<true>},
     {sweep_contacts<false>, sweep_contacts<true>},
     {sweep_frictions<false>, sweep_frictions<true>},

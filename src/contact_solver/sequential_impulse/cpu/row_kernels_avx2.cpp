@@ -23,13 +23,14 @@ struct Simd : Avx2Lanes {
   static Vec residual(Vec impulse, Vec inverse) {
     return _mm256_mul_pd(impulse, _mm256_div_pd(set(1), inverse));
   }
-  static void gather4(const Real* base, const std::int32_t* ids, int stride, Vec* out) {
+  [[gnu::always_inline]] static void gather4(const Real* base, const std::int32_t* ids, int stride,
+                                             Vec* out) {
     Vec r[4];
     for (int i = 0; i < 4; ++i) r[i] = load(field_of(base, ids[i], stride));
     transpose(r, out);
   }
-  static void scatter8(Real* base, const std::int32_t* ids, int stride, const Vec* u,
-                       const Vec* w) {
+  [[gnu::always_inline]] static void scatter8(Real* base, const std::int32_t* ids, int stride,
+                                              const Vec* u, const Vec* w) {
     Real nowhere[8];
     Vec low[4], high[4];
     transpose(u, low);
@@ -58,7 +59,8 @@ struct Simd : Avx2Lanes {
         residual(_mm256_extractf128_ps(impulse, 1), _mm256_extractf128_ps(inverse, 1)),
         residual(_mm256_castps256_ps128(impulse), _mm256_castps256_ps128(inverse)));
   }
-  static void gather4(const Real* base, const std::int32_t* ids, int stride, Vec* out) {
+  [[gnu::always_inline]] static void gather4(const Real* base, const std::int32_t* ids, int stride,
+                                             Vec* out) {
     Vec r[4];
     for (int i = 0; i < 4; ++i) {
       r[i] = _mm256_set_m128(_mm_loadu_ps(field_of(base, ids[i + 4], stride)),
@@ -66,8 +68,8 @@ struct Simd : Avx2Lanes {
     }
     transpose(r, out);
   }
-  static void scatter8(Real* base, const std::int32_t* ids, int stride, const Vec* u,
-                       const Vec* w) {
+  [[gnu::always_inline]] static void scatter8(Real* base, const std::int32_t* ids, int stride,
+                                              const Vec* u, const Vec* w) {
     Real nowhere[8];
     Vec low[4], high[4];
     transpose(u, low);

@@ -82,6 +82,8 @@ struct RowSolver::Program {
   std::uint64_t block_iterations = 0;  ///< iterations that include the blocks
   SerialRows* serial = nullptr;
   Real threshold = -1;
+  /// First iteration whose residual is exact. An earlier one is exact up to the threshold only.
+  std::uint64_t exact_from = 0;
   std::atomic<Real>* residuals = nullptr;  ///< one per iteration
   std::uint64_t colors = 0;
   std::span<const std::uint64_t> conflicts{};  ///< by part: set of parts with common bodies
@@ -188,13 +190,16 @@ struct RowSolver::Program {
     if (!progress.claimed.compare_exchange_strong(item, item + 1, std::memory_order_relaxed)) {
       return false;
     }
-    RowResidual residual;
+    const std::uint64_t iteration = item / (colors * pass_count);
+    RowResidual residual{.largest = residuals[iteration].load(std::memory_order_relaxed),
+                         .is_exact = iteration >= exact_from,
+                         .enough = threshold};
     if (blocks[0].size() != 0)
       passes[pass].sweep(arrays, blocks[0].first, blocks[0].last, &residual);
     progress.shared_done.store(item + 1, std::memory_order_release);
     if (blocks[1].size() != 0)
       passes[pass].sweep(arrays, blocks[1].first, blocks[1].last, &residual);
-    note(residual, item / (colors * pass_count));
+    note(residual, iteration);
     progress.done.store(item + 1, std::memory_order_release);
     return true;
   }
@@ -250,6 +255,7 @@ void RowSolver::resize_bodies(std::size_t count) {
 void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t directions) {
   directions_ = directions;
   rolling_friction_blocks_.count = 0;
+  all_regular_ = true;
   coloring_.build(pairs, body_count_);
   pairs_ = pairs;
   choose_parts();
@@ -267,9 +273,12 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
       for (std::size_t kind = 0; kind < 2; ++kind) {
         const std::size_t group = 2 * (color * parts_ + part) + kind;
         const std::uint32_t first = blocks_;
-        blocks_ += (next_lane_[group] + lanes - 1) / lanes;
+        std::uint32_t place = first * lanes;
+        for (std::uint32_t k = 0; k < kKindsOfContacts; ++k) {
+          place += std::exchange(next_lane_[kKindsOfContacts * group + k], place);
+        }
+        blocks_ = (place + lanes - 1) / lanes;
         ranges_[group] = {first, blocks_};
-        next_lane_[group] = first * lanes;
       }
     }
   }
@@ -277,6 +286,7 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   order_.reserve(places, "contacts of a solver");
   ids_.reserve(2 * places, "contacts of a solver");
   contacts_.reserve(places * rows::kContactFields, "rows of a solver");
+  split_rows_.reserve(blocks_, "rows of a solver");
   frictions_.reserve(places * directions * rows::kFrictionFields, "rows of a solver");
   std::fill_n(order_.data(), places, kNoContact);
   std::fill_n(ids_.data(), 2 * places, rows::kFixedBody);
@@ -293,13 +303,13 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
 /// moves a shared body. Counts the contacts of each group, and determines the conflicting parts.
 void RowSolver::assign_groups() {
   groups_.reserve(pairs_.size(), "contacts of a solver");
-  next_lane_.reserve(group_count(), "contacts of a solver");
-  std::fill_n(next_lane_.data(), group_count(), 0u);
+  next_lane_.reserve(kKindsOfContacts * group_count(), "contacts of a solver");
+  std::fill_n(next_lane_.data(), kKindsOfContacts * group_count(), 0u);
   const std::uint32_t* const colors = coloring_.colors_of_contacts();
   conflicts_.fill(0);
   if (parts_ == 1) {
     for (std::size_t i = 0; i < pairs_.size(); ++i) {
-      ++next_lane_[groups_[i] = 2 * colors[i] + 1];
+      ++next_lane_[groups_[i] = kKindsOfContacts * (2 * colors[i] + 1) + kind_of(pairs_[i])];
     }
     return;
   }
@@ -313,7 +323,8 @@ void RowSolver::assign_groups() {
       if (id >= 0 && (part_of_body_[body] & kIsShared) != 0) sharing |= parts_of_body_[body];
     }
     conflicts_[part] |= sharing & ~(std::uint64_t{1} << part);
-    ++next_lane_[groups_[i] = 2 * (colors[i] * parts_ + part) + (sharing != 0 ? 0 : 1)];
+    const std::uint32_t group = 2 * (colors[i] * parts_ + part) + (sharing != 0 ? 0 : 1);
+    ++next_lane_[groups_[i] = kKindsOfContacts * group + kind_of(pair)];
   }
 }
 
@@ -434,13 +445,17 @@ RowSolver::BlockIds RowSolver::ids_of(std::uint32_t block) const {
 
 unsigned RowSolver::set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
                                     const BlockIds& ids, const Real* inputs, Real* second) {
-  return kernels_.set_up_contacts(settings, inputs, bodies_.data(), ids.data(), contact_rows(block),
-                                  friction_rows(block), second);
+  const ContactSetup found =
+      kernels_.set_up_contacts(settings, inputs, bodies_.data(), ids.data(), contact_rows(block),
+                               friction_rows(block), second);
+  split_rows_[block] = static_cast<std::uint8_t>(std::popcount(found.has_split));
+  note_regular(found.is_regular);
+  return found.has_second;
 }
 void RowSolver::set_up_frictions(const rows::RowSettings& settings, std::uint32_t block,
                                  const BlockIds& ids, std::uint32_t direction, const Real* inputs) {
-  kernels_.set_up_frictions(settings, inputs, bodies_.data(), ids.data(),
-                            friction_rows(block, direction));
+  note_regular(kernels_.set_up_frictions(settings, inputs, bodies_.data(), ids.data(),
+                                         friction_rows(block, direction)));
 }
 
 RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_factors) {
@@ -451,10 +466,8 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
     // contain such a contact.
     select(
         [&](std::uint32_t block) {
-          const Real* rhs = contact_rows(block) + std::size_t{rows::kRowSplitRhs} * kernels_.lanes;
-          const auto here = std::count_if(rhs, rhs + kernels_.lanes, [](Real r) { return r != 0; });
-          split_rows += static_cast<std::uint64_t>(here);
-          return here > 0;
+          split_rows += split_rows_[block];
+          return split_rows_[block] > 0;
         },
         &split_impulse_blocks_);
   }
@@ -504,6 +517,10 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   split.residuals = residuals_.get() + iterations;
   main.residuals = residuals_.get();
   main.iterations = iterations;
+  if (all_regular_) {
+    split.exact_from = split.iterations;
+    main.exact_from = std::max<std::uint64_t>(iterations, 1) - 1;
+  }
   main.serial = settings.serial;
   if (settings.interleave) {
     add(&main, kernels_.both[factors], ranges_.data());

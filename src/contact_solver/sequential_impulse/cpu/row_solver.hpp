@@ -91,17 +91,14 @@ class JFPX_API RowSolver {
   template <class Has>
   void select_rolling_frictions(const Has& has) {
     select(has, &rolling_friction_blocks_);
-    rolling_frictions_.reserve(std::size_t{rolling_friction_blocks_.count} * kRollingFrictionRows *
-                                   kernels_.lanes * rows::kFrictionFields,
-                               "rows of a solver");
+    rolling_frictions_.reserve(blocks_ * rolling_numbers(), "rows of a solver");
   }
-  std::span<const std::uint32_t> rolling_friction_blocks() const {
-    return {rolling_friction_blocks_.blocks.data(), rolling_friction_blocks_.count};
+  /// Number of fields and lanes of the kRollingRows rolling friction rows of a block.
+  std::size_t rolling_numbers() const {
+    return std::size_t{rows::kRollingRows} * rows::kRollingFields * kernels_.lanes;
   }
-  /// Row t < kRollingFrictionRows of the k-th selected block.
-  Real* rolling_friction_rows(std::size_t k, std::uint32_t t) {
-    return rolling_frictions_.data() +
-           (k * kRollingFrictionRows + t) * kernels_.lanes * rows::kFrictionFields;
+  Real* rolling_friction_rows(std::uint32_t block) {
+    return rolling_frictions_.data() + block * rolling_numbers();
   }
 
   /// The bodies of a block: all bodies a, then all bodies b.
@@ -109,10 +106,20 @@ class JFPX_API RowSolver {
   BlockIds ids_of(std::uint32_t block) const;
   /// Sets up the contact rows of a block from its inputs. Thread-safe for different blocks.
   /// @param ids ids_of() the block
+  /// @return one bit per lane: whether `second` holds the second friction direction
   unsigned set_up_contacts(const rows::RowSettings& settings, std::uint32_t block,
                            const BlockIds& ids, const Real* inputs, Real* second);
   void set_up_frictions(const rows::RowSettings& settings, std::uint32_t block, const BlockIds& ids,
                         std::uint32_t direction, const Real* inputs);
+  /// Set up the rolling friction rows of a selected block, in two steps: see
+  /// rows::set_up_rolling_axes() and rows::set_up_rolling_frictions().
+  void set_up_rolling_axes(std::uint32_t block, const Real* normals) {
+    kernels_.set_up_rolling_axes(normals, rolling_friction_rows(block));
+  }
+  void set_up_rolling_frictions(std::uint32_t block, const BlockIds& ids) {
+    note_regular(kernels_.set_up_rolling_frictions(bodies_.data(), ids.data(),
+                                                   rolling_friction_rows(block)));
+  }
 
   /// @param factors whether any body has a linear or angular factor other than 1
   RowSweepReport solve(const RowSweepSettings& settings, bool factors);
@@ -153,6 +160,10 @@ class JFPX_API RowSolver {
   /// Groups of contacts: 2 * (color * parts + part) for contacts that move a shared body, which
   /// contacts of another part also move; the next number for other contacts.
   std::size_t group_count() const { return std::size_t{2} * colors() * parts_; }
+  /// Within a group, contacts whose bodies a are not moved precede those whose bodies b are not
+  /// moved, because blocks without moved bodies on one side take less time.
+  static constexpr std::uint32_t kKindsOfContacts = 3;
+  static std::uint32_t kind_of(const RowPair& pair) { return pair.a < 0 ? 0 : pair.b < 0 ? 1 : 2; }
   void choose_parts();
   void divide_bodies();
   void assign_slots();
@@ -166,6 +177,9 @@ class JFPX_API RowSolver {
     return id >= 0 ? slot(id) : ~slot(~id);
   }
   std::uint32_t part_of(const RowPair& pair) const;
+  void note_regular(bool is_regular) {
+    if (!is_regular) all_regular_.store(false, std::memory_order_relaxed);
+  }
   void assign_groups();
   void mark_shared_bodies();
 
@@ -184,12 +198,14 @@ class JFPX_API RowSolver {
   Buffer<Real> contacts_, frictions_, rolling_frictions_;
   Buffer<std::int32_t> ids_;
   Buffer<std::uint32_t> order_, next_lane_;
-  Buffer<std::uint32_t> groups_;  ///< by contact
+  Buffer<std::uint32_t> groups_;  ///< by contact: kKindsOfContacts * group + kind
   Buffer<BlockRange> ranges_;     ///< of the blocks, by group
   Buffer<std::uint64_t>
       parts_of_body_;  ///< by shared body: its part, and the parts whose contacts move it
   std::array<std::uint64_t, kMaxParts> conflicts_{};  ///< by part: set of parts with common bodies
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
+  Buffer<std::uint8_t> split_rows_;      ///< by block: number of contacts with a split impulse
+  std::atomic<bool> all_regular_{true};  ///< whether no row has an effective mass of 0
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
   std::uint32_t most_parts_ = 1;

@@ -44,8 +44,8 @@ GroupInputs allocate_inputs(const GroupSize& size, Arena* arena, std::size_t* le
   in.contacts = arena->allocate<Real>(size.contacts * rows::kInputFields);
   if (size.rolling_frictions > 0) {
     in.rolling_frictions = arena->allocate<std::uint32_t>(size.contacts);
-    in.rolling_friction_rows = arena->allocate<Real>(
-        size.rolling_frictions * rows::kRollingFrictionRows * rows::kFrictionFields);
+    in.rolling_friction_rows =
+        arena->allocate<Real>(size.rolling_frictions * rows::kRollingRows * rows::kRollingFields);
   }
   in.slot_contacts = arena->allocate<std::uint32_t>(size.contacts);
   in.schedule = arena->allocate<rows::ScheduledContact>(size.contacts);
