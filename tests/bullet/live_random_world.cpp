@@ -212,7 +212,9 @@ void LiveWorld::apply_traits(btRigidBody* made, const RandomBody& body) {
   if ((body.traits & kNoSleep) != 0) made->setActivationState(DISABLE_DEACTIVATION);
   if ((body.traits & kSleepy) != 0) made->setSleepingThresholds(1000 * body.size, 1000);
   if ((body.traits & kAnisotropic) != 0) {
-    made->setAnisotropicFriction(btVector3(1, btScalar(0.5), btScalar(0.2)));
+    made->setAnisotropicFriction(btVector3(1, btScalar(0.5), btScalar(0.2)),
+                                 btCollisionObject::CF_ANISOTROPIC_FRICTION |
+                                     btCollisionObject::CF_ANISOTROPIC_ROLLING_FRICTION);
   }
   if ((body.traits & kMargin) != 0) {
     made->getCollisionShape()->setMargin(body.size / 16);

@@ -5,6 +5,7 @@
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 
 #include <limits>
+#include <tuple>
 #include <utility>
 
 namespace jfpx {
@@ -522,6 +523,86 @@ TEST(Situations, CentresThatAreCoincidentDenormalInfiniteOrNotANumber) {
     });
     ASSERT_TRUE(twins.dispatch());
     EXPECT_GT(twins.stats().touching, 0u);
+  }
+}
+
+/// Piles apart on a floor. One is joined, and two touch a kinematic body, or one that is static but
+/// has a mass.
+void add_piles(BulletWorld& w, std::uint64_t seed) {
+  constexpr int kPiles = 40;
+  Random random(seed);
+  w.add(w.keep(new btBoxShape(btVector3(100, 1, 100))), btVector3(0, -1, 0), 0)
+      ->setRollingFriction(btScalar(0.1));
+  btCollisionShape* const box = w.keep(new btBoxShape(btVector3(1, 1, 1) / 2));
+  for (int pile = 0; pile < kPiles; ++pile) {
+    const btVector3 at(btScalar(pile % 8) * 6, 0, btScalar(pile / 8) * 6);
+    const std::size_t count = pile == 7 ? 60 : 2 + random.below(8);
+    btRigidBody* last = nullptr;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec3 p = random.uniform_in_box({0, Real(0.4), 0}, {1, 2, 1});
+      const btVector3 place = at + btVector3(p.x, p.y, p.z);
+      btRigidBody* const body = random.below(3) == 0
+                                    ? w.add(box, place, 2)
+                                    : w.add_sphere(random.uniform(Real(0.3), Real(0.6)), place);
+      body->setRollingFriction(btScalar(0.1) * btScalar(pile % 3));
+      body->setSpinningFriction(btScalar(0.05) * btScalar(i % 2));
+      if (pile % 5 == 4)
+        body->setAnisotropicFriction(btVector3(1, 2, 3) / 4, static_cast<int>(i % 4));
+      if (pile % 4 == 0) body->setActivationState(DISABLE_DEACTIVATION);
+      if (pile == 3 && last != nullptr) {
+        w.joints.push_back(std::make_unique<btPoint2PointConstraint>(
+            *last, *body, btVector3(0, btScalar(0.5), 0), btVector3(0, btScalar(-0.5), 0)));
+        w.world.addConstraint(w.joints.back().get());
+      }
+      last = body;
+    }
+  }
+  btRigidBody* const plate = w.add(w.keep(new btBoxShape(btVector3(4, btScalar(0.1), 1))),
+                                   btVector3(3, btScalar(0.2), 0), 0);
+  plate->setCollisionFlags(btCollisionObject::CF_KINEMATIC_OBJECT);
+  plate->setActivationState(DISABLE_DEACTIVATION);
+  btRigidBody* const heavy = w.add(w.keep(new btBoxShape(btVector3(4, btScalar(0.1), 1))),
+                                   btVector3(27, btScalar(0.2), 6), 5);
+  heavy->setCollisionFlags(btCollisionObject::CF_STATIC_OBJECT);
+}
+
+TEST(Situations, IslandsApartAreSolvedConcurrently) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const unsigned threads : {1u, 4u}) {
+    for (const int batch : {1, 20, 128}) {
+      Twins twins(all_parts(threads, {}, {.minimum_batch = 0}));
+      twins.both([&](BulletWorld& w) {
+        w.world.getSolverInfo().m_minimumSolverBatchSize = batch;
+        add_piles(w, seed);
+      });
+      for (int step = 0; step < 60; ++step) {
+        twins.both([&](BulletWorld& w) {  // the kinematic body shakes
+          btRigidBody& plate = *w.bodies[w.bodies.size() - 2];
+          btTransform pose = plate.getWorldTransform();
+          pose.getOrigin().setX(btScalar(3 + 0.05 * (step % 4)));
+          plate.setWorldTransform(pose);
+          plate.setInterpolationWorldTransform(pose);
+        });
+        ASSERT_TRUE(twins.step()) << threads << " threads, batches of " << batch;
+        const btSolverAnalyticsData &stock = twins.stock().solver->m_analyticsData,
+                                    &ours = twins.ours().solver->m_analyticsData;
+        ASSERT_EQ(std::tuple(ours.m_numSolverCalls, ours.m_numIterationsUsed, ours.m_islandId,
+                             ours.m_numBodies, ours.m_numContactManifolds,
+                             ours.m_remainingLeastSquaresResidual),
+                  std::tuple(stock.m_numSolverCalls, stock.m_numIterationsUsed, stock.m_islandId,
+                             stock.m_numBodies, stock.m_numContactManifolds,
+                             stock.m_remainingLeastSquaresResidual));
+      }
+      const ConstraintSolverStats& stats =
+          static_cast<ConstraintSolver&>(*twins.ours().solver).stats();
+      if (threads == 1) {
+        EXPECT_EQ(stats.concurrent, 0u);
+      } else {
+        EXPECT_GT(stats.concurrent, 60u);
+        EXPECT_LT(stats.concurrent, stats.groups) << "joined and kinematic bodies";
+      }
+    }
   }
 }
 

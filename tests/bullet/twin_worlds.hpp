@@ -84,6 +84,7 @@ struct BulletWorld {
         made_world(
             parts.world(dispatcher.get(), broadphase.get(), solver.get(), configuration.get())) {}
   ~BulletWorld() {
+    for (const auto& joint : joints) world.removeConstraint(joint.get());
     for (int i = world.getNumCollisionObjects() - 1; i >= 0; --i) {
       world.removeCollisionObject(world.getCollisionObjectArray()[i]);
     }
@@ -124,6 +125,7 @@ struct BulletWorld {
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btCollisionObject>> objects;
   std::vector<std::unique_ptr<btRigidBody>> bodies;
+  std::vector<std::unique_ptr<btTypedConstraint>> joints;  ///< destroyed before the bodies
   std::unique_ptr<btDiscreteDynamicsWorld> made_world;
   btDiscreteDynamicsWorld& world = *made_world;
   std::vector<std::string> log;  ///< calls of callbacks for this world

@@ -49,11 +49,12 @@ inline constexpr std::size_t kSolverFallbacks = 10;
 JFPX_BULLET_API std::string_view to_string(SolverFallback fallback) noexcept;
 
 struct ConstraintSolverStats {
-  std::uint64_t groups = 0;     ///< groups solved by jfpx
-  std::uint64_t on_device = 0;  ///< groups solved by jfpx on the GPU
-  std::uint64_t contacts = 0;   ///< contacts in the groups solved by jfpx
-  std::uint64_t joints = 0;     ///< constraints in the groups solved by jfpx
-  std::uint64_t sweeps = 0;     ///< sweeps over the rows of these groups
+  std::uint64_t groups = 0;      ///< groups solved by jfpx
+  std::uint64_t on_device = 0;   ///< groups solved by jfpx on the GPU
+  std::uint64_t concurrent = 0;  ///< groups solved by jfpx while other threads solved other groups
+  std::uint64_t contacts = 0;    ///< contacts in the groups solved by jfpx
+  std::uint64_t joints = 0;      ///< constraints in the groups solved by jfpx
+  std::uint64_t sweeps = 0;      ///< sweeps over the rows of these groups
   std::array<std::uint64_t, kSolverFallbacks> fallbacks{};  ///< groups, by SolverFallback
   /// Why the CPU permanently replaces the GPU; empty if the GPU has not failed.
   std::string device_failure;
@@ -63,6 +64,9 @@ struct ConstraintSolverStats {
 /// and in threads. Velocities, transforms, impulses, friction directions and analytics are
 /// bit-identical to those of btSequentialImpulseConstraintSolver: rows depend on each other only
 /// through moving bodies, and the rows of each body are solved in Bullet's order.
+///
+/// In a DynamicsWorld, several threads also solve several groups at a time: groups without joints
+/// and without kinematic bodies share nothing that the solver changes.
 ///
 /// The base class solves the groups that this class does not support; stats() counts them by
 /// reason. Programs that include Bullet's headers need -ffp-contract=off, which linking
@@ -92,6 +96,7 @@ class JFPX_BULLET_API ConstraintSolver : public btSequentialImpulseConstraintSol
 
  private:
   friend struct ConstraintSolverTestAccess;
+  friend class GroupBatch;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -9,8 +9,6 @@
 #include "src/bullet/solver/row_inputs.hpp"
 #include "src/bullet/thread_safe_library.hpp"
 
-#include <LinearMath/btQuickprof.h>
-
 #include <new>
 #include <utility>
 
@@ -27,14 +25,15 @@ ConstraintSolver::Impl::Impl(ConstraintSolver& owner, const ConstraintSolverOpti
       thread_safe_library(is_thread_safe_library()),
       solver(options.threads, options.simd),
       may_choose(options.backend != Backend::cuda),
-      minimum_batch(options.minimum_batch) {
+      minimum_batch(options.minimum_batch),
+      batch(options) {
   device.emplace(options.backend, cuda_group_solver_maker(options.device), solver.pool().threads());
 }
 
 std::optional<SolverFallback> ConstraintSolver::Impl::solve(
     std::span<btPersistentManifold* const> manifolds) {
   // Profile zones have the names of Bullet's solver.
-  BT_PROFILE("solveGroup");
+  const Zone zone(*this, "solveGroup");
   is_small = manifolds.size() < kSharedManifolds;
   joint_unlisted.clear();
   scan.clear_unlisted();
@@ -68,12 +67,12 @@ std::optional<SolverFallback> ConstraintSolver::Impl::solve(
 }
 
 void ConstraintSolver::Impl::set_up(std::span<btPersistentManifold* const> manifolds) {
-  BT_PROFILE("solveGroupCacheFriendlySetup");
+  const Zone zone(*this, "solveGroupCacheFriendlySetup");
   settings = row_settings(*info);
   set_up_bodies();
   if (!joints.empty()) set_up_joints();
   {
-    BT_PROFILE("find contacts");
+    const Zone search(*this, "find contacts");
     scan.run(pool(), manifolds, flags);
     set_up_unlisted_bodies(manifolds);
   }
@@ -102,7 +101,7 @@ DeviceGroup ConstraintSolver::Impl::device_group() {
 }
 
 rows::RowSweepReport ConstraintSolver::Impl::sweep() {
-  BT_PROFILE("solveGroupCacheFriendlyIterations");
+  const Zone zone(*this, "solveGroupCacheFriendlyIterations");
   btConstraintArray& rows = self.m_tmpSolverNonContactConstraintPool;
   const auto row_count = static_cast<std::size_t>(joints.empty() ? 0 : rows.size());
   JointRows joint_rows(solver, {row_count > 0 ? &rows[0] : nullptr, row_count}, joint_ids);

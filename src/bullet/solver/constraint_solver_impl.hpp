@@ -5,8 +5,11 @@
 
 #include "src/bullet/solver/contact_scan.hpp"
 #include "src/bullet/solver/gpu_island_solver.hpp"
+#include "src/bullet/solver/group_batch.hpp"
 #include "src/bullet/solver/group_choice.hpp"
 #include "src/contact_solver/sequential_impulse/cpu/row_solver.hpp"
+
+#include <LinearMath/btQuickprof.h>
 
 #include <array>
 #include <atomic>
@@ -54,8 +57,23 @@ struct ConstraintSolver::Impl {
   rows::RowSettings settings{};
   bool on_device = false;
   bool is_small = false;  ///< the loops over the group take less time than waking threads
+  /// Whether the groups of this solver may be solved on any thread. A program's functions for
+  /// profile zones and its allocator are called on the stepping thread only.
+  bool is_helper = false;
+  GroupBatch batch;
 
   Impl(ConstraintSolver& owner, const ConstraintSolverOptions& options);
+
+  /// A profile zone of Bullet during its lifetime, unless the solver is a helper.
+  class Zone {
+   public:
+    Zone(const Impl& impl, const char* name) {
+      if (!impl.is_helper) zone_.emplace(name);
+    }
+
+   private:
+    std::optional<CProfileSample> zone_;
+  };
 
   /// Solves the group. @return the reason if it is not solved; all data that Bullet's solver reads
   ///   is then unchanged

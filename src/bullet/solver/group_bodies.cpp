@@ -5,7 +5,6 @@
 #include "src/bullet/solver/row_inputs.hpp"
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
-#include <LinearMath/btQuickprof.h>
 
 #include <algorithm>
 
@@ -14,7 +13,7 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 void ConstraintSolver::Impl::set_up_bodies() {
-  BT_PROFILE("convertBodies");
+  const Zone zone(*this, "convertBodies");
   const std::size_t count = bodies.size();
   self.m_tmpSolverBodyPool.resizeNoInitialize(0);
   self.m_kinematicBodyUniqueIdToSolverBodyTable.resizeNoInitialize(0);  // used with BT_THREADSAFE

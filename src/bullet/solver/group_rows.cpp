@@ -6,8 +6,6 @@
 #include "src/bullet/solver/rolling_friction_rows.hpp"
 #include "src/bullet/solver/row_inputs.hpp"
 
-#include <LinearMath/btQuickprof.h>
-
 #include <algorithm>
 #include <iterator>
 
@@ -16,9 +14,9 @@ inline namespace JFPX_ABI {
 namespace bullet {
 
 void ConstraintSolver::Impl::set_up_rows() {
-  BT_PROFILE("solveGroupCacheFriendlySetup");
+  const Zone zone(*this, "solveGroupCacheFriendlySetup");
   {
-    BT_PROFILE("schedule contacts");
+    const Zone schedule(*this, "schedule contacts");
     solver.schedule(scan.pairs(), directions());
   }
   if (scan.any_rolling()) {
@@ -29,7 +27,7 @@ void ConstraintSolver::Impl::set_up_rows() {
 }
 
 void ConstraintSolver::Impl::set_up_contacts() {
-  BT_PROFILE("set up contacts");
+  const Zone zone(*this, "set up contacts");
   in_chunks(pool(), solver.blocks(), kBlocksPerChunk, [&](std::size_t first, std::size_t last) {
     for (auto block = static_cast<std::uint32_t>(first); block < last; ++block) {
       if (block + 1 < last) prefetch_block(block + 1);

@@ -2,14 +2,12 @@
 #include "src/bullet/chunks.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 
-#include <LinearMath/btQuickprof.h>
-
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace bullet {
 
 void ConstraintSolver::Impl::write_back() {
-  BT_PROFILE("solveGroupCacheFriendlyFinish");
+  const Zone zone(*this, "solveGroupCacheFriendlyFinish");
   if (on_device) {
     device->write_back(device_group());
   } else if (settings.warm_start) {

@@ -254,6 +254,8 @@ bool IslandSolver::reserve_geometric(btCollisionWorld& world, int constraint_cou
     jfpx::reserve_geometric(&manifolds_, manifolds);
     jfpx::reserve_geometric(&bodies_, static_cast<std::size_t>(world.getNumCollisionObjects()));
     jfpx::reserve_geometric(&constraints_, static_cast<std::size_t>(constraint_count));
+    // Each group has an island, and the last one may be empty.
+    jfpx::reserve_geometric(&groups_, static_cast<std::size_t>(world.getNumCollisionObjects()) + 1);
   } catch (const OutOfMemory&) {
     return false;
   } catch (const std::bad_alloc&) {
@@ -426,19 +428,30 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
                                btTypedConstraint** constraints, int constraint_count) {
   sort_manifolds(world.getDispatchInfo().m_deterministicOverlappingPairs);
   const btCollisionObjectArray& objects = world.getCollisionObjectArray();
-  const auto begin_group = [&] {
+  GroupBatch* const batch = GroupBatch::of(solver);
+  GroupSizes begin{};  // of the group, in the lists
+  const auto start = [&] {
     bodies_.clear();
     manifolds_.clear();
     constraints_.clear();
+    groups_.clear();
   };
-  const auto solve_group = [&] {
-    solver.solveGroup(bodies_.data(), static_cast<int>(bodies_.size()), manifolds_.data(),
-                      static_cast<int>(manifolds_.size()), constraints_.data(),
-                      static_cast<int>(constraints_.size()), info, world.getDebugDrawer(),
-                      world.getDispatcher());
-    begin_group();
+  const auto end_group = [&] {
+    groups_.push_back({std::span(bodies_).subspan(begin.bodies),
+                       std::span(manifolds_).subspan(begin.manifolds),
+                       std::span(constraints_).subspan(begin.constraints)});
+    if (batch != nullptr) {  // all groups together, because they change no state that is read here
+      begin = {bodies_.size(), manifolds_.size(), constraints_.size()};
+      return;
+    }
+    const SolverGroup& group = groups_.back();
+    solver.solveGroup(group.bodies.data(), static_cast<int>(group.bodies.size()),
+                      group.manifolds.data(), static_cast<int>(group.manifolds.size()),
+                      group.joints.data(), static_cast<int>(group.joints.size()), info,
+                      world.getDebugDrawer(), world.getDispatcher());
+    start();
   };
-  begin_group();  // discards dangling pointers after an exception of a solver
+  start();  // discards dangling pointers after an exception of a solver
   int key = 0, joint = 0;
   for (int first = 0, last = 0; first < unions.getNumElements(); first = last) {
     const int island = unions.getElement(first).m_id;
@@ -461,10 +474,14 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
       constraints_.push_back(constraints[joint]);
     }
     // Small islands are collected into one group.
-    const int size = static_cast<int>(constraints_.size() + manifolds_.size());
-    if (info.m_minimumSolverBatchSize <= 1 || size > info.m_minimumSolverBatchSize) solve_group();
+    const int size = static_cast<int>(constraints_.size() - begin.constraints + manifolds_.size() -
+                                      begin.manifolds);
+    if (info.m_minimumSolverBatchSize <= 1 || size > info.m_minimumSolverBatchSize) end_group();
   }
-  solve_group();  // as in Bullet, even if the group is empty
+  end_group();  // as in Bullet, even if the group is empty
+  if (batch == nullptr) return;
+  batch->solve(static_cast<ConstraintSolver&>(solver), groups_, info, world.getDebugDrawer(),
+               world.getDispatcher());
 }
 
 }  // namespace bullet

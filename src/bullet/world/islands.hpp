@@ -6,6 +6,7 @@
 
 #include "src/base/buffer.hpp"
 #include "src/base/thread_pool.hpp"
+#include "src/bullet/solver/group_batch.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 #include <BulletCollision/CollisionDispatch/btSimulationIslandManager.h>
@@ -13,8 +14,6 @@
 
 #include <span>
 #include <vector>
-
-class btTypedConstraint;
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -51,6 +50,9 @@ class IslandSolver {
   struct Edge {
     int a, b;
   };
+  struct GroupSizes {
+    std::size_t bodies, manifolds, constraints;
+  };
   struct PairKey {
     int island, uid0, uid1, index;
   };
@@ -79,6 +81,7 @@ class IslandSolver {
   Buffer<int> found_island_;             ///< their islands
   std::vector<int> chunk_counts_;
   int count_ = 0;
+  std::vector<SolverGroup> groups_;  ///< refer to the lists below, which do not grow meanwhile
   std::vector<btCollisionObject*> bodies_;
   std::vector<btPersistentManifold*> manifolds_;
   std::vector<btTypedConstraint*> constraints_;

@@ -1,0 +1,188 @@
+/// Selection of concurrent groups, and the threads that solve them; see the header.
+#include "src/bullet/solver/group_batch.hpp"
+
+#include "src/base/floating_point.hpp"
+#include "src/bullet/exact_class.hpp"
+#include "src/bullet/solver/constraint_solver_impl.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <chrono>
+#include <new>
+
+namespace jfpx {
+inline namespace JFPX_ABI {
+namespace bullet {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// First of the two alternatives of a chooser; the other is to solve one group after the other.
+constexpr std::size_t kConcurrent = 0;
+/// [us], shorter than the time of any group, so that the chooser measures both alternatives.
+constexpr double kFewestUsPerManifold = 1e-3;
+/// Threads divide the rows of larger groups. A GPU may solve them, if there is one.
+constexpr std::size_t kMostManifolds = kSharedManifolds;
+/// Fewer manifolds take less time than waking threads.
+constexpr std::size_t kLeastManifolds = 64;
+
+/// Whether all moving bodies of the manifold are in one island.
+bool is_in_one_island(const btPersistentManifold& manifold) {
+  const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
+  const int island = a.getIslandTag() >= 0 ? a.getIslandTag() : b.getIslandTag();
+  const auto is_in = [&](const btCollisionObject& object) {
+    const btRigidBody* const body = btRigidBody::upcast(&object);
+    if (body == nullptr) return true;
+    if (object.isStaticOrKinematicObject()) {
+      return !object.isKinematicObject() && body->getInvMass() == 0;
+    }
+    return object.getIslandTag() == island;
+  };
+  return is_in(a) && is_in(b);
+}
+
+}  // namespace
+
+GroupBatch::GroupBatch(const ConstraintSolverOptions& options)
+    : options_{.backend = Backend::cpu, .threads = 1, .simd = options.simd, .minimum_batch = 0},
+      choosers_(33, TimeChooser(2)) {}
+GroupBatch::~GroupBatch() = default;
+
+GroupBatch* GroupBatch::of(btConstraintSolver& solver) {
+  if (!is_exactly<ConstraintSolver>(solver)) return nullptr;
+  ConstraintSolver::Impl& impl = *static_cast<ConstraintSolver&>(solver).impl_;
+  return impl.may_choose && impl.solver.pool().threads() > 1 ? &impl.batch : nullptr;
+}
+
+void GroupBatch::solve(ConstraintSolver& solver, std::span<const SolverGroup> groups,
+                       const btContactSolverInfo& info, btIDebugDraw* drawer,
+                       btDispatcher* dispatcher) {
+  outcomes_.clear();
+  const bool has_choice = select(solver, groups, info) && solver.minimum_batch() > 0;
+  TimeChooser& chooser =
+      choosers_[std::min<std::size_t>(choosers_.size() - 1, std::bit_width(manifolds_))];
+  const double predicted_us = kFewestUsPerManifold * static_cast<double>(manifolds_);
+  Clock::time_point start;
+  bool is_concurrent = concurrent_.size() > 1;
+  if (has_choice) {
+    const std::array predicted{predicted_us, predicted_us};
+    is_concurrent =
+        chooser.choose(static_cast<double>(manifolds_), predicted).alternative == kConcurrent;
+    start = Clock::now();
+  }
+  if (is_concurrent) run(solver, groups, info);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const SolverGroup& group = groups[i];
+    if (i < outcomes_.size() && outcomes_[i].is_solved) {
+      adopt(&solver, outcomes_[i]);
+    } else {
+      solver.solveGroup(group.bodies.data(), static_cast<int>(group.bodies.size()),
+                        group.manifolds.data(), static_cast<int>(group.manifolds.size()),
+                        group.joints.data(), static_cast<int>(group.joints.size()), info, drawer,
+                        dispatcher);
+    }
+  }
+  if (!has_choice) return;
+  const std::chrono::duration<double, std::micro> us = Clock::now() - start;
+  chooser.record(us.count(), predicted_us);
+}
+
+/// Selects the groups to solve concurrently. @returns whether there are enough
+bool GroupBatch::select(ConstraintSolver& solver, std::span<const SolverGroup> groups,
+                        const btContactSolverInfo& info) {
+  ConstraintSolver::Impl& impl = *solver.impl_;
+  concurrent_.clear();
+  manifolds_ = 0;
+  impl.info = &info;
+  impl.joints = {};
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const SolverGroup& group = groups[i];
+    if (!group.joints.empty() || group.manifolds.empty() ||
+        group.manifolds.size() > kMostManifolds) {
+      continue;
+    }
+    impl.bodies = group.bodies;
+    if (impl.fallback_reason(group.manifolds)) continue;
+    concurrent_.push_back(static_cast<std::uint32_t>(i));
+    manifolds_ += group.manifolds.size();
+  }
+  if (impl.minimum_batch > 0 && manifolds_ < kLeastManifolds) concurrent_.clear();
+  std::ranges::sort(concurrent_, [&](std::uint32_t i, std::uint32_t k) {
+    const std::size_t of_i = groups[i].manifolds.size(), of_k = groups[k].manifolds.size();
+    return of_i != of_k ? of_i > of_k : i < k;
+  });
+  return concurrent_.size() > 1;
+}
+
+/// Reserves what the helpers cannot allocate on other threads.
+bool GroupBatch::reserve(ConstraintSolver& solver, std::span<const SolverGroup> groups) {
+  std::size_t bodies = 0;
+  for (const std::uint32_t i : concurrent_) bodies = std::max(bodies, groups[i].bodies.size());
+  try {
+    outcomes_.assign(groups.size(), Outcome{});
+    while (helpers_.size() < solver.impl_->solver.pool().threads()) {
+      helpers_.push_back(std::unique_ptr<Helper>(new Helper{ConstraintSolver(options_)}));
+      helpers_.back()->solver.impl_->is_helper = true;
+    }
+  } catch (const std::bad_alloc&) {
+    outcomes_.clear();
+    return false;
+  }
+  for (const std::unique_ptr<Helper>& helper : helpers_) {
+    helper->solver.m_tmpSolverBodyPool.reserve(static_cast<int>(bodies) + 1);
+  }
+  return true;
+}
+
+void GroupBatch::run(ConstraintSolver& solver, std::span<const SolverGroup> groups,
+                     const btContactSolverInfo& info) {
+  ConstraintSolver::Impl& impl = *solver.impl_;
+  if (!reserve(solver, groups)) return;
+  const ConstraintSolver::Impl::Zone zone(impl, "solveGroup");
+  std::atomic<std::size_t> next{0};
+  impl.solver.pool().run(helpers_.size(), [&](std::size_t thread) {
+    for (std::size_t k = next++; k < concurrent_.size(); k = next++) {
+      const std::uint32_t i = concurrent_[k];
+      solve_one(&helpers_[thread]->solver, groups[i], info, &outcomes_[i]);
+    }
+  });
+  for (const std::unique_ptr<Helper>& helper : helpers_) {
+    ConstraintSolverStats& stats = helper->solver.impl_->stats;
+    impl.stats.groups += stats.groups;
+    impl.stats.concurrent += stats.groups;
+    impl.stats.contacts += stats.contacts;
+    impl.stats.sweeps += stats.sweeps;
+    stats = {};
+  }
+}
+
+/// Thread-safe for different helpers and groups. Leaves a group unchanged that it does not solve.
+void GroupBatch::solve_one(ConstraintSolver* helper, const SolverGroup& group,
+                           const btContactSolverInfo& info, Outcome* outcome) {
+  if (!std::all_of(group.manifolds.begin(), group.manifolds.end(),
+                   [](const btPersistentManifold* m) { return is_in_one_island(*m); })) {
+    return;
+  }
+  ConstraintSolver::Impl& impl = *helper->impl_;
+  impl.info = &info;
+  impl.bodies = group.bodies;
+  impl.joints = {};
+  const TrapsMasked masked;
+  if (impl.solve(group.manifolds)) return;
+  *outcome = {true, helper->m_leastSquaresResidual, helper->m_analyticsData};
+}
+
+/// Makes the results that a solver keeps of its last group those of a concurrent group.
+void GroupBatch::adopt(ConstraintSolver* solver, const Outcome& outcome) {
+  btSolverAnalyticsData& data = solver->m_analyticsData;
+  const int calls = data.m_numSolverCalls + 1;
+  data = outcome.analytics;
+  data.m_numSolverCalls = calls;
+  solver->m_leastSquaresResidual = outcome.residual;
+}
+
+}  // namespace bullet
+}  // namespace JFPX_ABI
+}  // namespace jfpx
