@@ -65,8 +65,8 @@ struct ConstraintSolverStats {
 /// bit-identical to those of btSequentialImpulseConstraintSolver: rows depend on each other only
 /// through moving bodies, and the rows of each body are solved in Bullet's order.
 ///
-/// In a DynamicsWorld, several threads also solve several groups at a time: groups without joints
-/// and without kinematic bodies share nothing that the solver changes.
+/// In a DynamicsWorld, several threads also solve several groups at a time, except groups with
+/// kinematic bodies, which other groups may share.
 ///
 /// The base class solves the groups that this class does not support; stats() counts them by
 /// reason. Programs that include Bullet's headers need -ffp-contract=off, which linking

@@ -28,9 +28,12 @@ constexpr std::size_t kMostManifolds = kSharedManifolds;
 /// Fewer manifolds take less time than waking threads.
 constexpr std::size_t kLeastManifolds = 64;
 
-/// Whether all moving bodies of the manifold are in one island.
-bool is_in_one_island(const btPersistentManifold& manifold) {
-  const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
+/// The largest number of rows of a joint: two limits, a motor and a spring along and about each
+/// axis (btGeneric6DofSpring2Constraint).
+constexpr std::size_t kMostRowsOfJoint = 24;
+
+/// Whether the moving ones of two bodies are in one island.
+bool are_in_one_island(const btCollisionObject& a, const btCollisionObject& b) {
   const int island = a.getIslandTag() >= 0 ? a.getIslandTag() : b.getIslandTag();
   const auto is_in = [&](const btCollisionObject& object) {
     const btRigidBody* const body = btRigidBody::upcast(&object);
@@ -41,6 +44,16 @@ bool is_in_one_island(const btPersistentManifold& manifold) {
     return object.getIslandTag() == island;
   };
   return is_in(a) && is_in(b);
+}
+bool is_alone(const SolverGroup& group) {
+  return std::ranges::all_of(group.manifolds,
+                             [](const btPersistentManifold* manifold) {
+                               return are_in_one_island(*manifold->getBody0(),
+                                                        *manifold->getBody1());
+                             }) &&
+         std::ranges::all_of(group.joints, [](const btTypedConstraint* joint) {
+           return are_in_one_island(joint->getRigidBodyA(), joint->getRigidBodyB());
+         });
 }
 
 }  // namespace
@@ -96,14 +109,11 @@ bool GroupBatch::select(ConstraintSolver& solver, std::span<const SolverGroup> g
   concurrent_.clear();
   manifolds_ = 0;
   impl.info = &info;
-  impl.joints = {};
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const SolverGroup& group = groups[i];
-    if (!group.joints.empty() || group.manifolds.empty() ||
-        group.manifolds.size() > kMostManifolds) {
-      continue;
-    }
+    if (group.manifolds.empty() || group.manifolds.size() > kMostManifolds) continue;
     impl.bodies = group.bodies;
+    impl.joints = group.joints;
     if (impl.fallback_reason(group.manifolds)) continue;
     concurrent_.push_back(static_cast<std::uint32_t>(i));
     manifolds_ += group.manifolds.size();
@@ -118,8 +128,11 @@ bool GroupBatch::select(ConstraintSolver& solver, std::span<const SolverGroup> g
 
 /// Reserves what the helpers cannot allocate on other threads.
 bool GroupBatch::reserve(ConstraintSolver& solver, std::span<const SolverGroup> groups) {
-  std::size_t bodies = 0;
-  for (const std::uint32_t i : concurrent_) bodies = std::max(bodies, groups[i].bodies.size());
+  std::size_t bodies = 0, joints = 0;
+  for (const std::uint32_t i : concurrent_) {
+    bodies = std::max(bodies, groups[i].bodies.size());
+    joints = std::max(joints, groups[i].joints.size());
+  }
   try {
     outcomes_.assign(groups.size(), Outcome{});
     while (helpers_.size() < solver.impl_->solver.pool().threads()) {
@@ -131,7 +144,10 @@ bool GroupBatch::reserve(ConstraintSolver& solver, std::span<const SolverGroup> 
     return false;
   }
   for (const std::unique_ptr<Helper>& helper : helpers_) {
-    helper->solver.m_tmpSolverBodyPool.reserve(static_cast<int>(bodies) + 1);
+    ConstraintSolver& own = helper->solver;
+    own.m_tmpSolverBodyPool.reserve(static_cast<int>(bodies) + 1);  // and Bullet's fixed body
+    own.m_tmpConstraintSizesPool.reserve(static_cast<int>(joints));
+    own.m_tmpSolverNonContactConstraintPool.reserve(static_cast<int>(kMostRowsOfJoint * joints));
   }
   return true;
 }
@@ -153,6 +169,7 @@ void GroupBatch::run(ConstraintSolver& solver, std::span<const SolverGroup> grou
     impl.stats.groups += stats.groups;
     impl.stats.concurrent += stats.groups;
     impl.stats.contacts += stats.contacts;
+    impl.stats.joints += stats.joints;
     impl.stats.sweeps += stats.sweeps;
     stats = {};
   }
@@ -161,14 +178,11 @@ void GroupBatch::run(ConstraintSolver& solver, std::span<const SolverGroup> grou
 /// Thread-safe for different helpers and groups. Leaves a group unchanged that it does not solve.
 void GroupBatch::solve_one(ConstraintSolver* helper, const SolverGroup& group,
                            const btContactSolverInfo& info, Outcome* outcome) {
-  if (!std::all_of(group.manifolds.begin(), group.manifolds.end(),
-                   [](const btPersistentManifold* m) { return is_in_one_island(*m); })) {
-    return;
-  }
+  if (!is_alone(group)) return;
   ConstraintSolver::Impl& impl = *helper->impl_;
   impl.info = &info;
   impl.bodies = group.bodies;
-  impl.joints = {};
+  impl.joints = group.joints;
   const TrapsMasked masked;
   if (impl.solve(group.manifolds)) return;
   *outcome = {true, helper->m_leastSquaresResidual, helper->m_analyticsData};

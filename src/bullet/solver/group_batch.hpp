@@ -24,9 +24,9 @@ struct SolverGroup {
   std::span<btTypedConstraint*> joints;
 };
 
-/// A group is concurrent if it has no joints, and if the moving bodies of each of its contacts are
-/// in one island: no other group then refers to a body that its solution changes. Each thread has a
-/// solver of its own. Other groups are solved afterwards, by the user's solver.
+/// A group is concurrent if the moving bodies of each of its contacts and joints are in one island:
+/// no other group then refers to a body that its solution changes. Each thread has a solver of its
+/// own. Other groups are solved afterwards, by the user's solver.
 class GroupBatch {
  public:
   explicit GroupBatch(const ConstraintSolverOptions& options);
