@@ -147,6 +147,7 @@ void register_all() {
         ->ArgName("threads")
         ->Arg(1)
         ->Arg(2)
+        ->Arg(16)
         ->Iterations(240)
         ->UseManualTime()
         ->Unit(benchmark::kMillisecond);

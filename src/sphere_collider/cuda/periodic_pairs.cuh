@@ -40,7 +40,8 @@ __device__ Real doubt_of(const PeriodicInput& periodic, Real bound, Real largest
 
 /// The test detail::touch_at() of two given spheres a < b, and of the image of b near `image`. Its
 /// shift is one lower along the axis `lower`, unless that is -1. Loops are not unrolled and nothing
-/// is kept, because a search has few registers left for this rare test.
+/// is kept, because a search has few registers left for this rare test, and because most of its
+/// time is that of loading its instructions.
 __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInstance* reduced,
                                   std::uint32_t a, std::uint32_t b, const Vec3& image, int lower) {
   const SphereInstance &sa = known.given[a], &sb = known.given[b];
@@ -58,10 +59,12 @@ __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInst
       if (shift < 0) return false;  // no such image
       --shift;
     }
-    Real in_cell = x;
-    shift += detail::reduce(&in_cell, length);
-    in_cell = y;
-    shift -= detail::reduce(&in_cell, length);
+#pragma unroll 1
+    for (int i = 0; i < 2; ++i) {
+      Real in_cell = i == 0 ? x : y;
+      const std::int32_t cells = detail::reduce(&in_cell, length);
+      shift += i == 0 ? cells : -cells;
+    }
     const Real difference = detail::image_difference(x, y, shift, length);
     squares += difference * difference;
   }
@@ -73,13 +76,15 @@ __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInst
 /// from the sphere along an axis, and at its coordinate along the others.
 __device__ inline bool touches_image(const PeriodicSpheres& known, const SphereInstance* reduced,
                                      std::uint32_t a, std::uint32_t b, const Vec3& image) {
-  if (!touches_at(known, reduced, a, b, image, -1)) return false;
   const Real sum = known.given[a].radius + known.given[b].radius;
 #pragma unroll 1
-  for (int k = 0; k < 3; ++k) {
-    if (!known.cell.repeats[static_cast<std::size_t>(k)]) continue;
-    if (!detail::may_touch_twice(sum, known.cell.lengths[k])) continue;
-    if (touches_at(known, reduced, a, b, image, k)) return false;
+  for (int lower = -1; lower < 3; ++lower) {
+    if (lower >= 0) {
+      if (!known.cell.repeats[static_cast<std::size_t>(lower)]) continue;
+      if (!detail::may_touch_twice(sum, known.cell.lengths[lower])) continue;
+    }
+    const bool expected = lower < 0;
+    if (touches_at(known, reduced, a, b, image, lower) != expected) return false;
   }
   return true;
 }
