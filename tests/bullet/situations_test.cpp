@@ -3,8 +3,11 @@
 
 #include <BulletCollision/BroadphaseCollision/btSimpleBroadphase.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
+#include <LinearMath/btQuickprof.h>
 
+#include <atomic>
 #include <limits>
+#include <thread>
 #include <tuple>
 #include <utility>
 
@@ -574,9 +577,37 @@ void add_piles(BulletWorld& w, std::uint64_t seed) {
   w.world.addConstraint(w.joints.back().get());
 }
 
+std::thread::id g_stepping_thread;
+std::atomic<bool> g_zone_on_other_thread{false};
+
+/// Functions for profile zones during its lifetime, which note on which threads they are called.
+class WatchedZones {
+ public:
+  WatchedZones() {
+    g_stepping_thread = std::this_thread::get_id();
+    g_zone_on_other_thread = false;
+    btSetCustomEnterProfileZoneFunc([](const char*) { note(); });
+    btSetCustomLeaveProfileZoneFunc(note);
+  }
+  ~WatchedZones() {
+    btSetCustomEnterProfileZoneFunc(enter_);
+    btSetCustomLeaveProfileZoneFunc(leave_);
+  }
+  WatchedZones(const WatchedZones&) = delete;
+  WatchedZones& operator=(const WatchedZones&) = delete;
+
+ private:
+  static void note() {
+    if (std::this_thread::get_id() != g_stepping_thread) g_zone_on_other_thread = true;
+  }
+  btEnterProfileZoneFunc* const enter_ = btGetCurrentEnterProfileZoneFunc();
+  btLeaveProfileZoneFunc* const leave_ = btGetCurrentLeaveProfileZoneFunc();
+};
+
 TEST(Situations, IslandsApartAreSolvedConcurrently) {
   const std::uint64_t seed = test_seed();
   SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  const WatchedZones zones;
   for (const unsigned threads : {1u, 4u}) {
     for (const int batch : {1, 20, 128}) {
       Twins twins(all_parts(threads, {}, {.minimum_batch = 0}));
@@ -611,6 +642,58 @@ TEST(Situations, IslandsApartAreSolvedConcurrently) {
         EXPECT_LT(stats.concurrent, stats.groups) << "kinematic bodies";
       }
     }
+  }
+  EXPECT_FALSE(g_zone_on_other_thread);
+}
+
+/// Pulls a body along a pivot that follows a body of another island.
+class Follower : public btPoint2PointConstraint {
+ public:
+  Follower(btRigidBody& body, const btRigidBody& leader)
+      : btPoint2PointConstraint(body, btVector3(0, 0, 0)), leader_(leader) {}
+  void getInfo2(btConstraintInfo2* info) override {
+    setPivotB(getRigidBodyA().getWorldTransform().getOrigin() + leader_.getLinearVelocity() / 50);
+    btPoint2PointConstraint::getInfo2(info);
+  }
+
+ private:
+  const btRigidBody& leader_;
+};
+
+// A constraint of the user may read a body of another island, and joints may share a feedback.
+TEST(Situations, IslandsThatDependOnEachOtherAreSolvedInOrder) {
+  const std::uint64_t seed = test_seed();
+  SCOPED_TRACE("JFPX_TEST_SEED=" + std::to_string(seed));
+  for (const bool follows : {false, true}) {
+    Twins twins(all_parts(4, {}, {.minimum_batch = 0}));
+    btJointFeedback feedbacks[2];  // by world
+    int world = 0;
+    twins.both([&](BulletWorld& w) {
+      w.world.getSolverInfo().m_minimumSolverBatchSize = 1;
+      add_piles(w, seed);
+      const std::size_t count = w.bodies.size() - 2;
+      for (std::size_t i = 1; i + 100 < count; i += 25) {
+        btRigidBody &body = *w.bodies[i + 99], &other = *w.bodies[count - i];
+        if (follows) {
+          w.joints.push_back(std::make_unique<Follower>(body, other));
+        } else {
+          w.joints.push_back(
+              std::make_unique<btPoint2PointConstraint>(body, btVector3(0, btScalar(0.5), 0)));
+          w.joints.back()->setJointFeedback(&feedbacks[world]);
+        }
+        w.world.addConstraint(w.joints.back().get());
+      }
+      ++world;
+    });
+    for (int step = 0; step < 40; ++step) {
+      ASSERT_TRUE(twins.step()) << follows;
+      if (follows) continue;
+      ASSERT_EQ(bits_of(feedbacks[0].m_appliedForceBodyA),
+                bits_of(feedbacks[1].m_appliedForceBodyA));
+    }
+    const ConstraintSolverStats& stats =
+        static_cast<ConstraintSolver&>(*twins.ours().solver).stats();
+    EXPECT_EQ(stats.concurrent > 0, !follows);
   }
 }
 

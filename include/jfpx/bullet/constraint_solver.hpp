@@ -51,7 +51,7 @@ JFPX_BULLET_API std::string_view to_string(SolverFallback fallback) noexcept;
 struct ConstraintSolverStats {
   std::uint64_t groups = 0;      ///< groups solved by jfpx
   std::uint64_t on_device = 0;   ///< groups solved by jfpx on the GPU
-  std::uint64_t concurrent = 0;  ///< groups solved by jfpx while other threads solved other groups
+  std::uint64_t concurrent = 0;  ///< groups solved by jfpx, each on one thread, beside other groups
   std::uint64_t contacts = 0;    ///< contacts in the groups solved by jfpx
   std::uint64_t joints = 0;      ///< constraints in the groups solved by jfpx
   std::uint64_t sweeps = 0;      ///< sweeps over the rows of these groups
@@ -65,8 +65,8 @@ struct ConstraintSolverStats {
 /// bit-identical to those of btSequentialImpulseConstraintSolver: rows depend on each other only
 /// through moving bodies, and the rows of each body are solved in Bullet's order.
 ///
-/// In a DynamicsWorld, several threads also solve several groups at a time, except groups with
-/// kinematic bodies, which other groups may share.
+/// In a DynamicsWorld, several threads also solve several groups at a time, if no other group may
+/// share what the solution of a group changes, as a kinematic body may be shared.
 ///
 /// The base class solves the groups that this class does not support; stats() counts them by
 /// reason. Programs that include Bullet's headers need -ffp-contract=off, which linking

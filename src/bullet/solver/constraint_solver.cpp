@@ -118,6 +118,13 @@ rows::RowSweepReport ConstraintSolver::Impl::sweep() {
   return solver.solve(sweeps, factors);
 }
 
+/// As in Bullet, a change of the mode replaces row solvers that the user has set.
+void ConstraintSolver::Impl::set_mode(const btContactSolverInfo& settings_of_step) {
+  if (settings_of_step.m_solverMode == self.m_cachedSolverMode) return;
+  self.setupSolverFunctions((settings_of_step.m_solverMode & SOLVER_SIMD) != 0);
+  self.m_cachedSolverMode = settings_of_step.m_solverMode;
+}
+
 ConstraintSolver::ConstraintSolver(const ConstraintSolverOptions& options)
     : impl_(std::make_unique<Impl>(*this, options)) {}
 ConstraintSolver::~ConstraintSolver() = default;
@@ -144,11 +151,7 @@ btScalar ConstraintSolver::solveGroup(btCollisionObject** bodies, int body_count
                                       btTypedConstraint** constraints, int constraint_count,
                                       const btContactSolverInfo& info, btIDebugDraw* debug_drawer,
                                       btDispatcher* dispatcher) {
-  // As in Bullet, a change of the mode replaces row solvers that the user has set.
-  if (info.m_solverMode != m_cachedSolverMode) {
-    setupSolverFunctions((info.m_solverMode & SOLVER_SIMD) != 0);
-    m_cachedSolverMode = info.m_solverMode;
-  }
+  impl_->set_mode(info);
   impl_->info = &info;
   impl_->bodies = {bodies, static_cast<std::size_t>(body_count)};
   impl_->joints = {constraints, static_cast<std::size_t>(constraint_count)};

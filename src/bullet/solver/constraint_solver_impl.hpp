@@ -92,6 +92,7 @@ struct ConstraintSolver::Impl {
   void set_up_bodies();
   void set_up_body(std::size_t i, btCollisionObject* object);
   void set_up_joints();
+  void set_up_joint_rows();
   void set_up_unlisted_bodies(std::span<btPersistentManifold* const> manifolds);
   void pack(const btSolverBody& body, std::size_t id);
   void start(const btSolverBody& body, std::size_t id);
@@ -106,6 +107,7 @@ struct ConstraintSolver::Impl {
                                 const Real* normals);
 
   // constraint_solver.cpp
+  void set_mode(const btContactSolverInfo& settings_of_step);
   void set_up(std::span<btPersistentManifold* const> manifolds);
   rows::RowSweepReport solve_rows();
   rows::RowSweepReport sweep();

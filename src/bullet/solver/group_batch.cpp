@@ -32,28 +32,39 @@ constexpr std::size_t kLeastManifolds = 64;
 /// axis (btGeneric6DofSpring2Constraint).
 constexpr std::size_t kMostRowsOfJoint = 24;
 
-/// Whether the moving ones of two bodies are in one island.
-bool are_in_one_island(const btCollisionObject& a, const btCollisionObject& b) {
+/// What the contacts and joints of a group refer to, in ascending order of what that prevents.
+enum class Reach : std::uint8_t {
+  island,        ///< moving bodies of the islands of the group only: it may be solved concurrently
+  fixed_bodies,  ///< also kinematic bodies, or fixed ones with a mass, which get a number while the
+                 ///< group is solved
+  other_islands,  ///< also movable bodies of other groups, which must be solved in order
+};
+
+Reach reach_of(const btCollisionObject& a, const btCollisionObject& b) {
   const int island = a.getIslandTag() >= 0 ? a.getIslandTag() : b.getIslandTag();
-  const auto is_in = [&](const btCollisionObject& object) {
-    const btRigidBody* const body = btRigidBody::upcast(&object);
-    if (body == nullptr) return true;
-    if (object.isStaticOrKinematicObject()) {
-      return !object.isKinematicObject() && body->getInvMass() == 0;
+  Reach result = Reach::island;
+  for (const btCollisionObject* object : {&a, &b}) {
+    const btRigidBody* const body = btRigidBody::upcast(object);
+    if (body == nullptr) continue;
+    if (!object->isStaticOrKinematicObject()) {
+      if (object->getIslandTag() != island) return Reach::other_islands;
+    } else if (object->isKinematicObject() || body->getInvMass() != 0) {
+      result = Reach::fixed_bodies;
     }
-    return object.getIslandTag() == island;
-  };
-  return is_in(a) && is_in(b);
+  }
+  return result;
 }
-bool is_alone(const SolverGroup& group) {
-  return std::ranges::all_of(group.manifolds,
-                             [](const btPersistentManifold* manifold) {
-                               return are_in_one_island(*manifold->getBody0(),
-                                                        *manifold->getBody1());
-                             }) &&
-         std::ranges::all_of(group.joints, [](const btTypedConstraint* joint) {
-           return are_in_one_island(joint->getRigidBodyA(), joint->getRigidBodyB());
-         });
+Reach reach_of(const SolverGroup& group) {
+  Reach result = Reach::island;
+  for (const btPersistentManifold* manifold : group.manifolds) {
+    result = std::max(result, reach_of(*manifold->getBody0(), *manifold->getBody1()));
+  }
+  for (const btTypedConstraint* joint : group.joints) {
+    result = std::max(result, reach_of(joint->getRigidBodyA(), joint->getRigidBodyB()));
+    // Several joints may add to one feedback.
+    if (joint->getJointFeedback() != nullptr) result = std::max(result, Reach::fixed_bodies);
+  }
+  return result;
 }
 
 }  // namespace
@@ -72,13 +83,14 @@ GroupBatch* GroupBatch::of(btConstraintSolver& solver) {
 void GroupBatch::solve(ConstraintSolver& solver, std::span<const SolverGroup> groups,
                        const btContactSolverInfo& info, btIDebugDraw* drawer,
                        btDispatcher* dispatcher) {
-  outcomes_.clear();
-  const bool has_choice = select(solver, groups, info) && solver.minimum_batch() > 0;
+  solver.impl_->set_mode(info);
+  const bool has_enough = select(solver, groups, info);
+  const bool has_choice = has_enough && solver.minimum_batch() > 0;
   TimeChooser& chooser =
       choosers_[std::min<std::size_t>(choosers_.size() - 1, std::bit_width(manifolds_))];
   const double predicted_us = kFewestUsPerManifold * static_cast<double>(manifolds_);
   Clock::time_point start;
-  bool is_concurrent = concurrent_.size() > 1;
+  bool is_concurrent = has_enough;
   if (has_choice) {
     const std::array predicted{predicted_us, predicted_us};
     is_concurrent =
@@ -108,10 +120,26 @@ bool GroupBatch::select(ConstraintSolver& solver, std::span<const SolverGroup> g
   ConstraintSolver::Impl& impl = *solver.impl_;
   concurrent_.clear();
   manifolds_ = 0;
+  try {
+    concurrent_.reserve(groups.size());
+    outcomes_.resize(groups.size());
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+  std::atomic<bool> is_ordered{false};
+  impl.solver.pool().run(groups.size(), [&](std::size_t i) {
+    const Reach reach = reach_of(groups[i]);
+    outcomes_[i] = {.is_alone = reach == Reach::island};
+    if (reach == Reach::other_islands) is_ordered.store(true, std::memory_order_relaxed);
+  });
+  if (is_ordered) return false;
   impl.info = &info;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const SolverGroup& group = groups[i];
-    if (group.manifolds.empty() || group.manifolds.size() > kMostManifolds) continue;
+    if (!outcomes_[i].is_alone || group.manifolds.empty() ||
+        std::max(group.manifolds.size(), group.joints.size()) > kMostManifolds) {
+      continue;
+    }
     impl.bodies = group.bodies;
     impl.joints = group.joints;
     if (impl.fallback_reason(group.manifolds)) continue;
@@ -126,6 +154,10 @@ bool GroupBatch::select(ConstraintSolver& solver, std::span<const SolverGroup> g
   return concurrent_.size() > 1;
 }
 
+std::size_t GroupBatch::helpers_in_use(ConstraintSolver& solver) const {
+  return std::min<std::size_t>(concurrent_.size(), solver.impl_->solver.pool().threads());
+}
+
 /// Reserves what the helpers cannot allocate on other threads.
 bool GroupBatch::reserve(ConstraintSolver& solver, std::span<const SolverGroup> groups) {
   std::size_t bodies = 0, joints = 0;
@@ -134,17 +166,15 @@ bool GroupBatch::reserve(ConstraintSolver& solver, std::span<const SolverGroup> 
     joints = std::max(joints, groups[i].joints.size());
   }
   try {
-    outcomes_.assign(groups.size(), Outcome{});
-    while (helpers_.size() < solver.impl_->solver.pool().threads()) {
+    while (helpers_.size() < helpers_in_use(solver)) {
       helpers_.push_back(std::unique_ptr<Helper>(new Helper{ConstraintSolver(options_)}));
       helpers_.back()->solver.impl_->is_helper = true;
     }
   } catch (const std::bad_alloc&) {
-    outcomes_.clear();
     return false;
   }
-  for (const std::unique_ptr<Helper>& helper : helpers_) {
-    ConstraintSolver& own = helper->solver;
+  for (std::size_t i = 0; i < helpers_in_use(solver); ++i) {
+    ConstraintSolver& own = helpers_[i]->solver;
     own.m_tmpSolverBodyPool.reserve(static_cast<int>(bodies) + 1);  // and Bullet's fixed body
     own.m_tmpConstraintSizesPool.reserve(static_cast<int>(joints));
     own.m_tmpSolverNonContactConstraintPool.reserve(static_cast<int>(kMostRowsOfJoint * joints));
@@ -158,7 +188,7 @@ void GroupBatch::run(ConstraintSolver& solver, std::span<const SolverGroup> grou
   if (!reserve(solver, groups)) return;
   const ConstraintSolver::Impl::Zone zone(impl, "solveGroup");
   std::atomic<std::size_t> next{0};
-  impl.solver.pool().run(helpers_.size(), [&](std::size_t thread) {
+  impl.solver.pool().run(helpers_in_use(solver), [&](std::size_t thread) {
     for (std::size_t k = next++; k < concurrent_.size(); k = next++) {
       const std::uint32_t i = concurrent_[k];
       solve_one(&helpers_[thread]->solver, groups[i], info, &outcomes_[i]);
@@ -178,14 +208,15 @@ void GroupBatch::run(ConstraintSolver& solver, std::span<const SolverGroup> grou
 /// Thread-safe for different helpers and groups. Leaves a group unchanged that it does not solve.
 void GroupBatch::solve_one(ConstraintSolver* helper, const SolverGroup& group,
                            const btContactSolverInfo& info, Outcome* outcome) {
-  if (!is_alone(group)) return;
   ConstraintSolver::Impl& impl = *helper->impl_;
   impl.info = &info;
   impl.bodies = group.bodies;
   impl.joints = group.joints;
   const TrapsMasked masked;
   if (impl.solve(group.manifolds)) return;
-  *outcome = {true, helper->m_leastSquaresResidual, helper->m_analyticsData};
+  outcome->is_solved = true;
+  outcome->residual = helper->m_leastSquaresResidual;
+  outcome->analytics = helper->m_analyticsData;
 }
 
 /// Makes the results that a solver keeps of its last group those of a concurrent group.

@@ -24,9 +24,10 @@ struct SolverGroup {
   std::span<btTypedConstraint*> joints;
 };
 
-/// A group is concurrent if the moving bodies of each of its contacts and joints are in one island:
-/// no other group then refers to a body that its solution changes. Each thread has a solver of its
-/// own. Other groups are solved afterwards, by the user's solver.
+/// A group is concurrent if the moving bodies of its contacts and joints are in its own islands. If
+/// a contact or joint of any group has a movable body of another island, the order of the groups
+/// matters, and none is concurrent. Each thread has a solver of its own. Other groups are solved
+/// afterwards, in order, by the user's solver.
 class GroupBatch {
  public:
   explicit GroupBatch(const ConstraintSolverOptions& options);
@@ -46,13 +47,15 @@ class GroupBatch {
     ConstraintSolver solver;
   };
   struct Outcome {
-    bool is_solved;
-    btScalar residual;
-    btSolverAnalyticsData analytics;
+    bool is_alone = false;   ///< it may be solved concurrently
+    bool is_solved = false;  ///< it has been
+    btScalar residual = 0;
+    btSolverAnalyticsData analytics{};
   };
 
   bool select(ConstraintSolver& solver, std::span<const SolverGroup> groups,
               const btContactSolverInfo& info);
+  std::size_t helpers_in_use(ConstraintSolver& solver) const;
   bool reserve(ConstraintSolver& solver, std::span<const SolverGroup> groups);
   void run(ConstraintSolver& solver, std::span<const SolverGroup> groups,
            const btContactSolverInfo& info);

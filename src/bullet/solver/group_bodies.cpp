@@ -64,6 +64,45 @@ void ConstraintSolver::Impl::start(const btSolverBody& body, std::size_t id) {
   std::fill_n(solver.push_velocity(id), rows::kVelocityFields, Real(0));
 }
 
+/// Equals Bullet's convertJoints() without its profile zone, which it would enter on any thread.
+void ConstraintSolver::Impl::set_up_joint_rows() {
+  const Zone zone(*this, "convertJoints");
+  for (btTypedConstraint* joint : joints) {
+    joint->buildJacobian();
+    joint->internalSetAppliedImpulse(0);
+  }
+  self.m_tmpConstraintSizesPool.resizeNoInitialize(static_cast<int>(joints.size()));
+  const auto rows_of = [&](std::size_t i) -> btTypedConstraint::btConstraintInfo1& {
+    return self.m_tmpConstraintSizesPool[static_cast<int>(i)];
+  };
+  int rows = 0;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if (btJointFeedback* const feedback = joints[i]->getJointFeedback()) {
+      for (btVector3* v : {&feedback->m_appliedForceBodyA, &feedback->m_appliedTorqueBodyA,
+                           &feedback->m_appliedForceBodyB, &feedback->m_appliedTorqueBodyB}) {
+        v->setZero();
+      }
+    }
+    if (joints[i]->isEnabled()) {
+      joints[i]->getInfo1(&rows_of(i));
+    } else {
+      rows_of(i).m_numConstraintRows = rows_of(i).nub = 0;
+    }
+    rows += rows_of(i).m_numConstraintRows;
+  }
+  self.m_tmpSolverNonContactConstraintPool.resizeNoInitialize(rows);
+  int row = 0;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const btTypedConstraint::btConstraintInfo1& of_joint = rows_of(i);
+    if (of_joint.m_numConstraintRows == 0) continue;
+    const int a = self.getOrInitSolverBody(joints[i]->getRigidBodyA(), settings.dt);
+    const int b = self.getOrInitSolverBody(joints[i]->getRigidBodyB(), settings.dt);
+    self.convertJoint(&self.m_tmpSolverNonContactConstraintPool[row], joints[i], of_joint, a, b,
+                      *info);
+    row += of_joint.m_numConstraintRows;
+  }
+}
+
 /// Bullet creates the rows of joints. Assigns ids to the bodies that Bullet adds for them.
 void ConstraintSolver::Impl::set_up_joints() {
   btAlignedObjectArray<btSolverBody>& pool = self.m_tmpSolverBodyPool;
@@ -71,10 +110,12 @@ void ConstraintSolver::Impl::set_up_joints() {
   self.m_maxOverrideNumSolverIterations = 0;
   for (btTypedConstraint* joint : joints) {
     for (btRigidBody* body : {&joint->getRigidBodyA(), &joint->getRigidBodyB()}) {
-      if (body->getCompanionId() < 0) joint_unlisted.push_back({body, body->getCompanionId()});
+      if (body->getCompanionId() < 0 && moving_body(body) != nullptr) {
+        joint_unlisted.push_back({body, body->getCompanionId()});
+      }
     }
   }
-  self.convertJoints(joints.data(), static_cast<int>(joints.size()), *info);
+  set_up_joint_rows();
   // Includes joints without rows, whose bodies Bullet adds when it solves the joints.
   for (btTypedConstraint* joint : joints) {
     if (!joint->isEnabled()) continue;

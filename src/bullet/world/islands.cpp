@@ -7,6 +7,7 @@
 #include "src/base/reserve.hpp"
 #include "src/bullet/chunks.hpp"
 #include "src/bullet/prefetch.hpp"
+#include "src/bullet/solver/joint_rows.hpp"
 #include "src/bullet/world/parallel_quick_sort.hpp"
 #include "src/bullet/world/plain_dispatcher.hpp"
 
@@ -428,7 +429,11 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
                                btTypedConstraint** constraints, int constraint_count) {
   sort_manifolds(world.getDispatchInfo().m_deterministicOverlappingPairs);
   const btCollisionObjectArray& objects = world.getCollisionObjectArray();
-  GroupBatch* const batch = GroupBatch::of(solver);
+  // A constraint of another class may change any body, while Bullet reads the next island.
+  GroupBatch* const batch =
+      are_known_joints({constraints, static_cast<std::size_t>(constraint_count)})
+          ? GroupBatch::of(solver)
+          : nullptr;
   GroupSizes begin{};  // of the group, in the lists
   const auto start = [&] {
     bodies_.clear();

@@ -33,7 +33,7 @@ struct RowResidual {
 struct ContactSetup {
   unsigned has_second;  ///< whether there is a second friction direction
   unsigned has_split;   ///< whether there is a split impulse
-  bool is_regular;      ///< no effective mass is 0, so that a residual is NaN only if an impulse is
+  bool is_regular;      ///< see set_up_frictions
 };
 
 /// Sweeps over the blocks [first, last) in their order.
@@ -47,12 +47,13 @@ struct RowKernels {
   ContactSetup (*set_up_contacts)(const rows::RowSettings& settings, const Real* inputs,
                                   const Real* bodies, const std::int32_t* ids, Real* contacts,
                                   Real* frictions, Real* second);
-  /// @return whether no effective mass is 0
+  /// @return whether the effective masses are normal numbers: a residual is NaN only if an impulse
+  /// is
   bool (*set_up_frictions)(const rows::RowSettings& settings, const Real* inputs,
                            const Real* bodies, const std::int32_t* ids, Real* frictions);
   /// See rows::set_up_rolling_axes() and rows::set_up_rolling_frictions().
   void (*set_up_rolling_axes)(const Real* normal, Real* rows);
-  /// @return whether no effective mass is 0
+  /// @return as set_up_frictions
   bool (*set_up_rolling_frictions)(const Real* bodies, const std::int32_t* ids, Real* rows);
   // Index 1: with factors.
   RowSweep warm_starts[2];

@@ -2,6 +2,8 @@
 #include "src/contact_solver/sequential_impulse/contact_rows.hpp"
 #include "src/contact_solver/sequential_impulse/cpu/row_kernels.hpp"
 
+#include <float.h>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
@@ -44,9 +46,11 @@ Real* contact_of(const RowArrays& arrays, std::uint32_t block) {
 Real* friction_of(const RowArrays& arrays, std::uint32_t block) {
   return arrays.frictions + std::size_t{rows::kFrictionFields} * kLanes * arrays.directions * block;
 }
-/// Whether no lane of a field is 0.
-bool is_nonzero(const Real* field) {
-  return !Simd::any(Simd::negate_mask(Simd::differs(Simd::load(field), Simd::set(0))));
+/// Whether all lanes are at least the smallest normal number, so that 1 divided by one is finite.
+bool is_normal(const Real* field) {
+  constexpr Real kSmallest = sizeof(Real) == 4 ? Real(FLT_MIN) : Real(DBL_MIN);
+  const auto magnitude = Simd::absolute(Simd::load(field));
+  return !Simd::any(Simd::negate_mask(Simd::less_equal(Simd::set(kSmallest), magnitude)));
 }
 
 ContactSetup set_up_contacts(const rows::RowSettings& settings, const Real* inputs,
@@ -56,12 +60,12 @@ ContactSetup set_up_contacts(const rows::RowSettings& settings, const Real* inpu
       rows::set_up_contact<Simd>(settings, inputs, bodies, ids, contacts, frictions, second);
   const auto split = Simd::load(contacts + rows::kRowSplitRhs * kLanes);
   return {Simd::bits(has_second), Simd::bits(Simd::differs(split, Simd::set(0))),
-          is_nonzero(contacts + rows::kRowInverse * kLanes)};
+          is_normal(contacts + rows::kRowInverse * kLanes)};
 }
 bool set_up_frictions(const rows::RowSettings& settings, const Real* inputs, const Real* bodies,
                       const std::int32_t* ids, Real* frictions) {
   rows::set_up_friction<Simd>(settings, inputs, bodies, ids, frictions);
-  return is_nonzero(frictions + rows::kRowInverse * kLanes);
+  return is_normal(frictions + rows::kRowInverse * kLanes);
 }
 void set_up_rolling_axes(const Real* normal, Real* rows) {
   rows::set_up_rolling_axes<Simd>(normal, rows);
@@ -70,7 +74,7 @@ bool set_up_rolling_frictions(const Real* bodies, const std::int32_t* ids, Real*
   rows::set_up_rolling_frictions<Simd>(bodies, ids, rows);
   bool is_regular = true;
   for (std::uint32_t t = 0; t < rows::kRollingRows; ++t) {
-    is_regular &= is_nonzero(rows + (t * rows::kRollingFields + rows::kRollingInverse) * kLanes);
+    is_regular &= is_normal(rows + (t * rows::kRollingFields + rows::kRollingInverse) * kLanes);
   }
   return is_regular;
 }

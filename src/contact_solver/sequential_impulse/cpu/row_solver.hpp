@@ -205,7 +205,7 @@ class JFPX_API RowSolver {
   std::array<std::uint64_t, kMaxParts> conflicts_{};  ///< by part: set of parts with common bodies
   BlockSubset split_impulse_blocks_, rolling_friction_blocks_;
   Buffer<std::uint8_t> split_rows_;      ///< by block: number of contacts with a split impulse
-  std::atomic<bool> all_regular_{true};  ///< whether no row has an effective mass of 0
+  std::atomic<bool> all_regular_{true};  ///< whether all effective masses are normal numbers
   std::unique_ptr<std::atomic<Real>[]> residuals_;
   std::size_t residual_capacity_ = 0;
   std::uint32_t most_parts_ = 1;
