@@ -2,6 +2,7 @@
 #include "src/bullet/solver/group_batch.hpp"
 
 #include "src/base/floating_point.hpp"
+#include "src/bullet/chunks.hpp"
 #include "src/bullet/exact_class.hpp"
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 
@@ -27,6 +28,7 @@ constexpr double kFewestUsPerManifold = 1e-3;
 constexpr std::size_t kMostManifolds = kSharedManifolds;
 /// Fewer manifolds take less time than waking threads.
 constexpr std::size_t kLeastManifolds = 64;
+constexpr std::size_t kItemsPerChunk = 512;
 
 /// The largest number of rows of a joint: two limits, a motor and a spring along and about each
 /// axis (btGeneric6DofSpring2Constraint).
@@ -54,12 +56,19 @@ Reach reach_of(const btCollisionObject& a, const btCollisionObject& b) {
   }
   return result;
 }
-Reach reach_of(const SolverGroup& group) {
+bool is_large(const SolverGroup& group) {
+  return std::max(group.manifolds.size(), group.joints.size()) > kMostManifolds;
+}
+Reach reach_of(std::span<btPersistentManifold* const> manifolds) {
   Reach result = Reach::island;
-  for (const btPersistentManifold* manifold : group.manifolds) {
+  for (const btPersistentManifold* manifold : manifolds) {
     result = std::max(result, reach_of(*manifold->getBody0(), *manifold->getBody1()));
   }
-  for (const btTypedConstraint* joint : group.joints) {
+  return result;
+}
+Reach reach_of(std::span<btTypedConstraint* const> joints) {
+  Reach result = Reach::island;
+  for (const btTypedConstraint* joint : joints) {
     result = std::max(result, reach_of(joint->getRigidBodyA(), joint->getRigidBodyB()));
     // Several joints may add to one feedback.
     if (joint->getJointFeedback() != nullptr) result = std::max(result, Reach::fixed_bodies);
@@ -84,13 +93,12 @@ void GroupBatch::solve(ConstraintSolver& solver, std::span<const SolverGroup> gr
                        const btContactSolverInfo& info, btIDebugDraw* drawer,
                        btDispatcher* dispatcher) {
   solver.impl_->set_mode(info);
-  const bool has_enough = select(solver, groups, info);
-  const bool has_choice = has_enough && solver.minimum_batch() > 0;
+  bool is_concurrent = select(solver, groups, info);
+  const bool has_choice = is_concurrent && solver.minimum_batch() > 0;
   TimeChooser& chooser =
       choosers_[std::min<std::size_t>(choosers_.size() - 1, std::bit_width(manifolds_))];
   const double predicted_us = kFewestUsPerManifold * static_cast<double>(manifolds_);
   Clock::time_point start;
-  bool is_concurrent = has_enough;
   if (has_choice) {
     const std::array predicted{predicted_us, predicted_us};
     is_concurrent =
@@ -119,39 +127,65 @@ bool GroupBatch::select(ConstraintSolver& solver, std::span<const SolverGroup> g
                         const btContactSolverInfo& info) {
   ConstraintSolver::Impl& impl = *solver.impl_;
   concurrent_.clear();
-  manifolds_ = 0;
   try {
     concurrent_.reserve(groups.size());
-    outcomes_.resize(groups.size());
+    outcomes_.assign(groups.size(), Outcome{});
   } catch (const std::bad_alloc&) {
+    outcomes_.clear();  // of the last step
     return false;
   }
-  std::atomic<bool> is_ordered{false};
-  impl.solver.pool().run(groups.size(), [&](std::size_t i) {
-    const Reach reach = reach_of(groups[i]);
-    outcomes_[i] = {.is_alone = reach == Reach::island};
-    if (reach == Reach::other_islands) is_ordered.store(true, std::memory_order_relaxed);
-  });
-  if (is_ordered) return false;
   impl.info = &info;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     const SolverGroup& group = groups[i];
-    if (!outcomes_[i].is_alone || group.manifolds.empty() ||
-        std::max(group.manifolds.size(), group.joints.size()) > kMostManifolds) {
-      continue;
-    }
+    if (group.manifolds.empty() || is_large(group)) continue;
     impl.bodies = group.bodies;
     impl.joints = group.joints;
-    if (impl.fallback_reason(group.manifolds)) continue;
-    concurrent_.push_back(static_cast<std::uint32_t>(i));
-    manifolds_ += group.manifolds.size();
+    if (!impl.fallback_reason(group.manifolds)) {
+      concurrent_.push_back(static_cast<std::uint32_t>(i));
+    }
   }
-  if (impl.minimum_batch > 0 && manifolds_ < kLeastManifolds) concurrent_.clear();
+  if (!has_enough(impl, groups) || !are_independent(impl.solver.pool(), groups)) return false;
+  std::erase_if(concurrent_, [&](std::uint32_t i) { return !outcomes_[i].is_alone; });
   std::ranges::sort(concurrent_, [&](std::uint32_t i, std::uint32_t k) {
     const std::size_t of_i = groups[i].manifolds.size(), of_k = groups[k].manifolds.size();
     return of_i != of_k ? of_i > of_k : i < k;
   });
-  return concurrent_.size() > 1;
+  return has_enough(impl, groups);
+}
+
+bool GroupBatch::has_enough(const ConstraintSolver::Impl& impl,
+                            std::span<const SolverGroup> groups) {
+  manifolds_ = 0;
+  for (const std::uint32_t i : concurrent_) manifolds_ += groups[i].manifolds.size();
+  return concurrent_.size() > 1 && (impl.minimum_batch == 0 || manifolds_ >= kLeastManifolds);
+}
+
+/// Whether the order of the groups does not matter. Finds those that may be solved concurrently.
+bool GroupBatch::are_independent(ThreadPool& pool, std::span<const SolverGroup> groups) {
+  std::atomic<bool> are_independent{true};
+  const auto note = [&](Reach reach) {
+    if (reach == Reach::other_islands) are_independent.store(false, std::memory_order_relaxed);
+    return reach == Reach::island;
+  };
+  pool.run(groups.size(), [&](std::size_t i) {
+    if (is_large(groups[i])) return;
+    const bool has_own_contacts =
+        note(reach_of(std::span<btPersistentManifold* const>(groups[i].manifolds)));
+    const bool has_own_joints =
+        note(reach_of(std::span<btTypedConstraint* const>(groups[i].joints)));
+    outcomes_[i].is_alone = has_own_contacts && has_own_joints;
+  });
+  const auto note_all = [&](const auto& all) {
+    in_chunks(pool, all.size(), kItemsPerChunk, [&](std::size_t first, std::size_t last) {
+      note(reach_of(all.subspan(first, last - first)));
+    });
+  };
+  for (const SolverGroup& group : groups) {
+    if (!is_large(group)) continue;
+    note_all(std::span<btPersistentManifold* const>(group.manifolds));
+    note_all(std::span<btTypedConstraint* const>(group.joints));
+  }
+  return are_independent;
 }
 
 std::size_t GroupBatch::helpers_in_use(ConstraintSolver& solver) const {

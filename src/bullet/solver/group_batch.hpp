@@ -3,6 +3,7 @@
 
 #include <jfpx/bullet/constraint_solver.hpp>
 
+#include "src/base/thread_pool.hpp"
 #include "src/base/time_chooser.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
@@ -55,6 +56,8 @@ class GroupBatch {
 
   bool select(ConstraintSolver& solver, std::span<const SolverGroup> groups,
               const btContactSolverInfo& info);
+  bool has_enough(const ConstraintSolver::Impl& impl, std::span<const SolverGroup> groups);
+  bool are_independent(ThreadPool& pool, std::span<const SolverGroup> groups);
   std::size_t helpers_in_use(ConstraintSolver& solver) const;
   bool reserve(ConstraintSolver& solver, std::span<const SolverGroup> groups);
   void run(ConstraintSolver& solver, std::span<const SolverGroup> groups,
