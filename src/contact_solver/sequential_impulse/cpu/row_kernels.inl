@@ -85,16 +85,16 @@ bool moves_any(const std::int32_t* ids) {
   for (std::uint32_t lane = 0; lane < kLanes; ++lane) all &= ids[lane];
   return all >= 0;
 }
-/// Calls f.operator()<Moved>() with the bodies of a block that rows move. The bodies on one side of
+/// Calls f(MovedBodies) with the bodies of a block that rows move. The bodies on one side of
 /// most blocks are fixed, where a terrain or a floor is.
 template <class F>
 [[gnu::always_inline]] inline void visit_moved(const std::int32_t* ids, const F& f) {
   if (!moves_any(ids)) {
-    f.template operator()<rows::MovedBodies<false, true>>();
+    f(rows::MovedBodies<false, true>());
   } else if (!moves_any(ids + kLanes)) {
-    f.template operator()<rows::MovedBodies<true, false>>();
+    f(rows::MovedBodies<true, false>());
   } else {
-    f.template operator()<rows::BothMoved>();
+    f(rows::BothMoved());
   }
 }
 
@@ -113,9 +113,9 @@ template <bool kFactors>
 void sweep_warm_starts(const RowArrays& arrays, std::uint32_t first, std::uint32_t last,
                        RowResidual*) {
   for (std::uint32_t i = first; i < last; ++i) {
-    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
-      rows::warm_start<Simd, kFactors, Moved>(ids_of(arrays, i), arrays.velocities, arrays.factors,
-                                              contact_of(arrays, i));
+    visit_moved(ids_of(arrays, i), [&](auto moved) {
+      rows::warm_start<Simd, kFactors, decltype(moved)>(ids_of(arrays, i), arrays.velocities,
+                                                        arrays.factors, contact_of(arrays, i));
     });
   }
 }
@@ -124,8 +124,8 @@ void sweep_contacts(const RowArrays& arrays, std::uint32_t first, std::uint32_t 
                     RowResidual* residual) {
   BlockResidual sum(*residual);
   for (std::uint32_t i = first; i < last; ++i) {
-    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
-      rows::solve_contact<Simd, kFactors, false, Moved>(
+    visit_moved(ids_of(arrays, i), [&](auto moved) {
+      rows::solve_contact<Simd, kFactors, false, decltype(moved)>(
           ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), &sum);
     });
   }
@@ -137,7 +137,7 @@ void sweep_frictions(const RowArrays& arrays, std::uint32_t first, std::uint32_t
   BlockResidual sum(*residual);
   for (std::uint32_t i = first; i < last; ++i) {
     visit_moved(ids_of(arrays, i),
-                [&]<class Moved>() { solve_frictions<kFactors, Moved>(arrays, i, &sum); });
+                [&](auto moved) { solve_frictions<kFactors, decltype(moved)>(arrays, i, &sum); });
   }
   sum.store(residual);
 }
@@ -146,10 +146,10 @@ void sweep_both(const RowArrays& arrays, std::uint32_t first, std::uint32_t last
                 RowResidual* residual) {
   BlockResidual sum(*residual);
   for (std::uint32_t i = first; i < last; ++i) {
-    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
-      rows::solve_contact<Simd, kFactors, false, Moved>(
+    visit_moved(ids_of(arrays, i), [&](auto moved) {
+      rows::solve_contact<Simd, kFactors, false, decltype(moved)>(
           ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), &sum);
-      solve_frictions<kFactors, Moved>(arrays, i, &sum);
+      solve_frictions<kFactors, decltype(moved)>(arrays, i, &sum);
     });
   }
   sum.store(residual);
@@ -160,9 +160,9 @@ void sweep_split_impulses(const RowArrays& arrays, std::uint32_t first, std::uin
   BlockResidual sum(*residual);
   for (std::uint32_t k = first; k < last; ++k) {
     const std::uint32_t i = arrays.split_impulse_blocks[k];
-    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
-      rows::solve_contact<Simd, kFactors, true, Moved>(ids_of(arrays, i), arrays.push_velocities,
-                                                       arrays.factors, contact_of(arrays, i), &sum);
+    visit_moved(ids_of(arrays, i), [&](auto moved) {
+      rows::solve_contact<Simd, kFactors, true, decltype(moved)>(
+          ids_of(arrays, i), arrays.push_velocities, arrays.factors, contact_of(arrays, i), &sum);
     });
   }
   sum.store(residual);
@@ -176,10 +176,10 @@ void sweep_rolling_frictions(const RowArrays& arrays, std::uint32_t first, std::
     const std::uint32_t i = arrays.rolling_friction_blocks[k];
     Real* const of_block = arrays.rolling_frictions +
                            std::size_t{rows::kRollingRows * rows::kRollingFields} * kLanes * i;
-    visit_moved(ids_of(arrays, i), [&]<class Moved>() {
-      rows::solve_rolling_frictions<Simd, kFactors, Moved>(ids_of(arrays, i), arrays.velocities,
-                                                           arrays.factors, contact_of(arrays, i),
-                                                           of_block, &sum);
+    visit_moved(ids_of(arrays, i), [&](auto moved) {
+      rows::solve_rolling_frictions<Simd, kFactors, decltype(moved)>(
+          ids_of(arrays, i), arrays.velocities, arrays.factors, contact_of(arrays, i), of_block,
+          &sum);
     });
   }
   sum.store(residual);
