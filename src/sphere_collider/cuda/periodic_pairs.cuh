@@ -40,8 +40,7 @@ __device__ Real doubt_of(const PeriodicInput& periodic, Real bound, Real largest
 
 /// The test detail::touch_at() of two given spheres a < b, and of the image of b near `image`. Its
 /// shift is one lower along the axis `lower`, unless that is -1. Loops are not unrolled and nothing
-/// is kept, because a search has few registers left for this rare test, and because most of its
-/// time is that of loading its instructions.
+/// is kept, because a search has few registers left for this rare test.
 __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInstance* reduced,
                                   std::uint32_t a, std::uint32_t b, const Vec3& image, int lower) {
   const SphereInstance &sa = known.given[a], &sb = known.given[b];
