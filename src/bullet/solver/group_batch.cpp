@@ -78,6 +78,14 @@ Reach reach_of(std::span<btTypedConstraint* const> joints) {
 
 }  // namespace
 
+void solve_group(btConstraintSolver& solver, const SolverGroup& group,
+                 const btContactSolverInfo& info, btIDebugDraw* drawer, btDispatcher* dispatcher) {
+  solver.solveGroup(group.bodies.data(), static_cast<int>(group.bodies.size()),
+                    group.manifolds.data(), static_cast<int>(group.manifolds.size()),
+                    group.joints.data(), static_cast<int>(group.joints.size()), info, drawer,
+                    dispatcher);
+}
+
 GroupBatch::GroupBatch(const ConstraintSolverOptions& options)
     : options_{.backend = Backend::cpu, .threads = 1, .simd = options.simd, .minimum_batch = 0},
       choosers_(33, TimeChooser(2)) {}
@@ -107,14 +115,10 @@ void GroupBatch::solve(ConstraintSolver& solver, std::span<const SolverGroup> gr
   }
   if (is_concurrent) run(solver, groups, info);
   for (std::size_t i = 0; i < groups.size(); ++i) {
-    const SolverGroup& group = groups[i];
     if (i < outcomes_.size() && outcomes_[i].is_solved) {
       adopt(&solver, outcomes_[i]);
     } else {
-      solver.solveGroup(group.bodies.data(), static_cast<int>(group.bodies.size()),
-                        group.manifolds.data(), static_cast<int>(group.manifolds.size()),
-                        group.joints.data(), static_cast<int>(group.joints.size()), info, drawer,
-                        dispatcher);
+      solve_group(solver, groups[i], info, drawer, dispatcher);
     }
   }
   if (!has_choice) return;

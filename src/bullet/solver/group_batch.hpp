@@ -25,6 +25,10 @@ struct SolverGroup {
   std::span<btTypedConstraint*> joints;
 };
 
+/// Calls solveGroup() with a group.
+void solve_group(btConstraintSolver& solver, const SolverGroup& group,
+                 const btContactSolverInfo& info, btIDebugDraw* drawer, btDispatcher* dispatcher);
+
 /// A group is concurrent if the moving bodies of its contacts and joints are in its own islands. If
 /// a contact or joint of any group has a movable body of another island, the order of the groups
 /// matters, and none is concurrent. Each thread has a solver of its own. Other groups are solved

@@ -449,11 +449,7 @@ void IslandSolver::solve_awake(btCollisionWorld& world, btUnionFind& unions,
       begin = {bodies_.size(), manifolds_.size(), constraints_.size()};
       return;
     }
-    const SolverGroup& group = groups_.back();
-    solver.solveGroup(group.bodies.data(), static_cast<int>(group.bodies.size()),
-                      group.manifolds.data(), static_cast<int>(group.manifolds.size()),
-                      group.joints.data(), static_cast<int>(group.joints.size()), info,
-                      world.getDebugDrawer(), world.getDispatcher());
+    solve_group(solver, groups_.back(), info, world.getDebugDrawer(), world.getDispatcher());
     start();
   };
   start();  // discards dangling pointers after an exception of a solver
