@@ -65,11 +65,13 @@ __device__ inline T warp_inclusive_sum(T value) {
 }
 
 /// Minimum and maximum over the lanes of a warp, returned in every lane.
-__device__ inline std::int32_t lowest_of_warp(std::int32_t x) {
+template <std::integral T>
+__device__ T lowest_of_warp(T x) {
+  static_assert(sizeof(T) == 4);
 #if __CUDA_ARCH__ >= 800
   return __reduce_min_sync(kFullWarp, x);
 #else
-  return warp_reduce(x, [](std::int32_t p, std::int32_t q) { return p < q ? p : q; });
+  return warp_reduce(x, [](T p, T q) { return p < q ? p : q; });
 #endif
 }
 __device__ inline std::int32_t highest_of_warp(std::int32_t x) { return ~lowest_of_warp(~x); }

@@ -112,8 +112,9 @@ __global__ void __launch_bounds__(kEmitThreads) mask_emit(MaskEmitArgs args) {
   const SphereInstance sphere = load_sphere(args.spheres + a);
   for (std::uint32_t w = a / kTile * kWordsPerTile; at != end; w += 32) {
     const std::uint32_t word = w + lane_id() < stride ? words[w + lane_id()] : 0;
-    at = emit_row(known, at, a, sphere, w, word,
-                  [&](std::uint32_t b) { return load_sphere(args.spheres + b); });
+    at = emit_row(at, w, word, [&](unsigned long long to, std::uint32_t b) {
+      write_contact(known, to, a, b, sphere, load_sphere(args.spheres + b));
+    });
   }
 }
 

@@ -115,14 +115,11 @@ std::optional<std::uint64_t> ArraySearch::search_to(const SphereInput& input,
   }
 }
 
-/// The same for pairs in an array with room for `capacity`, which may be exceeded by the number.
-template <class Index>
-std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput& input, Index* to,
-                                                         std::size_t capacity, Stream user) {
+std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput& input,
+                                                         const IndexRows& to, std::size_t capacity,
+                                                         Stream user) {
   kind = ArrayResult::pairs;
-  const SearchOutput output{.capacity = capacity,
-                            .count = counts.data(),
-                            .rows = {.indices = to, .is_wide = sizeof(Index) == 8}};
+  const SearchOutput output{.capacity = capacity, .count = counts.data(), .rows = to};
   while (true) {
     const PolledCount found = search_and_poll(input, output, user);
     if (!found.is_valid) return {};
@@ -140,7 +137,8 @@ std::uint64_t ArraySearch::find(const SphereArrays& from, Stream user) {
 template <class Index>
 std::uint64_t ArraySearch::find_pairs(const SphereArrays& from, Index* to, std::size_t capacity,
                                       Stream user) {
-  return *search_to_rows(prepare(from, user), to, capacity, user);
+  return *search_to_rows(prepare(from, user), {.indices = to, .is_wide = sizeof(Index) == 8},
+                         capacity, user);
 }
 
 template <class Item>
@@ -168,9 +166,7 @@ void ArraySearch::reject(std::uint32_t invalid, cudaStream_t after) {
 JFPX_INSTANTIATE(SpherePair)
 JFPX_INSTANTIATE(SphereContact)
 #undef JFPX_INSTANTIATE
-#define JFPX_INSTANTIATE(Index)                                                                 \
-  template std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput&, Index*, \
-                                                                    std::size_t, Stream);       \
+#define JFPX_INSTANTIATE(Index) \
   template std::uint64_t ArraySearch::find_pairs(const SphereArrays&, Index*, std::size_t, Stream);
 JFPX_INSTANTIATE(std::int32_t)
 JFPX_INSTANTIATE(std::int64_t)

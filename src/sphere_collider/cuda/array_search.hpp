@@ -74,8 +74,7 @@ struct ArraySearch {
   template <class Item>
   std::optional<std::uint64_t> search_to(const SphereInput& input, DeviceBuffer<Item>* out,
                                          Stream user);
-  template <class Index>
-  std::optional<std::uint64_t> search_to_rows(const SphereInput& input, Index* to,
+  std::optional<std::uint64_t> search_to_rows(const SphereInput& input, const IndexRows& to,
                                               std::size_t capacity, Stream user);
   template <class Index>
   std::uint64_t find_pairs(const SphereArrays& from, Index* to, std::size_t capacity, Stream user);

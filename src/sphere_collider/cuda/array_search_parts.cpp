@@ -86,9 +86,14 @@ template <class Index>
 std::uint64_t ArraySearch::find_periodic_pairs(const SphereArrays& from, const PeriodicCell& cell,
                                                Index* to, std::int32_t* shifts,
                                                std::size_t capacity, Stream user) {
-  const std::uint64_t found = search_in_cell(
-      from, nullptr, cell, user,
-      [&](const SphereInput& input) { return search_to_rows(input, to, capacity, user); });
+  const std::uint64_t found =
+      search_in_cell(from, nullptr, cell, user, [&](const SphereInput& input) {
+        const IndexRows output{.indices = to,
+                               .is_wide = sizeof(Index) == 8,
+                               .shifts = shifts,
+                               .points = periodic.spheres().points};
+        return search_to_rows(input, output, capacity, user);
+      });
   if (found > capacity) return found;
   launch_write_shifts(in_cells, PairRows<Index>{to, found}, shifts, found, user);
   return found;

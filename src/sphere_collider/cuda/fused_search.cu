@@ -146,8 +146,9 @@ __global__ void __launch_bounds__(kThreads) fused_search(FusedArgs args) {
   for (unsigned k = 0; k < kRowsOfWarp; ++k) {
     const std::uint32_t a = row(k);
     if (a >= n) continue;
-    emit_row(known, s.offsets[a], a, s.spheres[a], 0, words[k],
-             [&](std::uint32_t b) { return s.spheres[b]; });
+    emit_row(s.offsets[a], 0, words[k], [&](unsigned long long at, std::uint32_t b) {
+      write_contact(known, at, a, b, s.spheres[a], s.spheres[b]);
+    });
   }
 #else
   static_cast<void>(args);

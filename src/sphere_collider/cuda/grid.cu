@@ -78,22 +78,26 @@ __global__ void __launch_bounds__(kThreads, kThreads == 512 ? kSortBlocks : 1)
   sort_coarse<kThreads>(args, plan, capacity, sort_storage(dynamic_storage, capacity), sums);
 }
 
+/// Searches on a single level, or prepares the search of crowded spheres.
 template <bool kPeriodic>
 __global__ void __launch_bounds__(kGridThreads, kSearchBlocks)
     single_level_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ SingleLevelStorage storage[kGridWarps];
-  if (!is_valid_input(args) || !args.plan->single || args.plan->queries != 0) return;
+  if (!is_valid_input(args) || !args.plan->single) return;
+  if (args.plan->ordered) order_cells(args, *args.plan);
+  if (args.plan->crowded) return;
   SingleLevelSearcher<kPeriodic>(args, output, *args.plan, storage[threadIdx.x / 32])
       .run(blockIdx.x * kGridThreads + threadIdx.x);
 }
 
-template <bool kPeriodic, unsigned kQueries>
+template <bool kPeriodic, bool kOrdered>
 __device__ void search_crowded(const GridArgs& args, const SearchOutput& output,
                                CrowdedStorage& storage) {
-  CrowdedSearcher<kPeriodic, kQueries> searcher(args, output, *args.plan, storage);
+  using Searcher = CrowdedSearcher<kPeriodic, kOrdered>;
+  Searcher searcher(args, output, *args.plan, storage);
   const std::uint32_t position = blockIdx.x * kGridThreads + threadIdx.x - lane_id();
-  for (std::uint32_t k = 0; k < 32; k += kQueries) {
+  for (std::uint32_t k = 0; k < 32; k += Searcher::kQueries) {
     if (position + k < args.input.n) searcher.run(position + k);
   }
 }
@@ -103,11 +107,11 @@ __global__ void __launch_bounds__(kGridThreads, kCrowdedBlocks)
     crowded_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ CrowdedStorage storage[kGridWarps];
-  if (!is_valid_input(args)) return;
-  if (args.plan->queries == kCrowdedQueries) {
-    search_crowded<kPeriodic, kCrowdedQueries>(args, output, storage[threadIdx.x / 32]);
-  } else if (args.plan->queries == kVeryCrowdedQueries) {
-    search_crowded<kPeriodic, kVeryCrowdedQueries>(args, output, storage[threadIdx.x / 32]);
+  if (!is_valid_input(args) || !args.plan->crowded) return;
+  if (args.plan->ordered) {
+    search_crowded<kPeriodic, true>(args, output, storage[threadIdx.x / 32]);
+  } else {
+    search_crowded<kPeriodic, false>(args, output, storage[threadIdx.x / 32]);
   }
 }
 
@@ -150,13 +154,19 @@ __global__ void __launch_bounds__(kGridThreads) sum_phase(GridArgs args, SearchO
   }
 }
 
-__global__ void __launch_bounds__(kGridThreads, kCopyBlocks)
+template <bool kPeriodic>
+__global__ void __launch_bounds__(kGridThreads, kCopyBlocks<kPeriodic>)
     copy_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ CopyStorage storage;
   if (!is_valid_input(args) || !args.plan->single || !is_complete(args, output)) return;
-  copy_bin(args, with_row_length(args, output), blockIdx.x,
-           contacts_before(args, blockIdx.x, storage), storage);
+  if (blockIdx.x == 0 && threadIdx.x == 0 && writes_shifts<kPeriodic>(args, output)) {
+    args.input.periodic.known->shifts_are_written = true;
+  }
+  const unsigned long long before = contacts_before(args, blockIdx.x, storage);
+  copy_bin<kPeriodic>(args, with_row_length(args, output), blockIdx.x, before, storage);
+  __syncthreads();
+  if (args.state->overflow != 0) defer_long_rows(args, blockIdx.x, before, storage);
 }
 
 __global__ void __launch_bounds__(kGridThreads) emit_phase(GridArgs args, SearchOutput output) {
@@ -179,11 +189,12 @@ __global__ void __launch_bounds__(kGridThreads) list_phase(GridArgs args, Search
     place_overflow(args);
   }
 }
+template <bool kPeriodic>
 __global__ void __launch_bounds__(kGridThreads) long_row_phase(GridArgs args, SearchOutput output) {
   wait_for_previous_kernel();
   __shared__ LongRowStorage storage;
   if (has_long_rows(args, output)) {
-    emit_long_rows(args, with_row_length(args, output), storage);
+    emit_long_rows<kPeriodic>(args, with_row_length(args, output), storage);
   }
 }
 
@@ -268,10 +279,10 @@ void launch_phases(const GridArgs& args, const SearchOutput& output, const GridL
   run(search_phase<false, kPeriodic>, std::min(chunks, multiprocessors * kLevelBlocks<false>), args,
       output);
   run(sum_phase, many_blocks, args, output);
-  run(copy_phase, chunks_of(args.input.rows()), args, output);
+  run(copy_phase<kPeriodic>, chunks_of(args.input.rows()), args, output);
   run(emit_phase, many_blocks, args, output);
   run(list_phase<kPeriodic>, few_blocks, args, output);
-  run(long_row_phase, 6 * multiprocessors, args, output);
+  run(long_row_phase<kPeriodic>, 6 * multiprocessors, args, output);
 }
 
 constexpr std::size_t rounded(std::size_t bytes) { return (bytes + 255) / 256 * 256; }

@@ -79,10 +79,11 @@ struct GridPlan {
   GridScale scale;
   bool dense;
   bool single;  ///< dense, and all spheres are on level 0
-  /// Number of spheres that a warp searches for together, if it does: `single`, with more than
-  /// kCrowded or kVeryCrowded spheres per cube of the cell width on average, and a cell width that
-  /// local_filter.hpp supports. Otherwise 0.
-  std::uint32_t queries;
+  /// Whether a warp searches for several spheres together: `single`, with more than kCrowded
+  /// spheres per cube of the cell width on average, and a cell width that local_filter.hpp
+  /// supports.
+  bool crowded;
+  bool ordered;      ///< crowded, with more than kVeryCrowded spheres per cube: see order_cells()
   bool equal_radii;  ///< of all spheres
   Real inverse_yz;   ///< inverse cell width of level 0, in y and z
   std::uint32_t buckets;
@@ -138,6 +139,12 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
     const int level = static_cast<int>(lane_id());
     GridScale scale{half_0_of(args.state), last_level(state, args.input.n)};
     Real x_cells = 2;  // cells in x per cell width of the last level
+    // In a periodic cell, only pairs of equal spheres can be tested relative to a common origin.
+    const bool equal_radii = state.largest_half == ~state.smallest_half;
+    const bool may_be_crowded =
+        scale.last_level == 0 && state.has_far == 0 && (equal_radii || !args.input.is_periodic()) &&
+        scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
+    Real per_cube = 0;  // spheres per cube of the cell width
     const Vec3 high{from_ordered(state.farthest[0]), from_ordered(state.farthest[2]),
                     from_ordered(state.farthest[4])};
     const Vec3 low{-from_ordered(state.farthest[1]), -from_ordered(state.farthest[3]),
@@ -165,7 +172,11 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       }
       cells_to_here = warp_inclusive_sum(cells);
       all_cells = __shfl_sync(kFullWarp, cells_to_here, 31);
-      if (all_cells <= args.table.size || x_cells == 1) break;
+      per_cube =
+          max(per_cube, x_cells * static_cast<Real>(args.input.n) / static_cast<Real>(all_cells));
+      const bool fits = all_cells <= args.table.size,
+                 is_ordered = fits && may_be_crowded && per_cube > kVeryCrowded;
+      if ((fits && !is_ordered) || x_cells == 1) break;
       x_cells = 1;
       cells = 0;
     }
@@ -177,16 +188,9 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
       plan.scale = scale;
       plan.dense = dense;
       plan.single = dense && scale.last_level == 0;
-      plan.equal_radii = state.largest_half == ~state.smallest_half;
-      // In a periodic cell, only pairs of equal spheres can be tested relative to a common origin.
-      const bool is_decidable = plan.equal_radii || !args.input.is_periodic();
-      const Real per_cube =
-          x_cells * static_cast<Real>(args.input.n) / static_cast<Real>(all_cells);
-      const bool is_crowded = plan.single && is_decidable && per_cube > kCrowded &&
-                              scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
-      plan.queries = !is_crowded               ? 0
-                     : per_cube > kVeryCrowded ? kVeryCrowdedQueries
-                                               : kCrowdedQueries;
+      plan.equal_radii = equal_radii;
+      plan.crowded = plan.single && may_be_crowded && per_cube > kCrowded;
+      plan.ordered = plan.crowded && per_cube > kVeryCrowded;
       plan.inverse_yz = inverse_width(half_cell_of(scale.half_0, 0));
       plan.buckets = dense ? static_cast<std::uint32_t>(all_cells) : args.table.size;
       plan.coarse_shift = 0;

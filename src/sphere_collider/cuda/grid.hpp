@@ -85,7 +85,7 @@ struct GridArgs {
     /// [n] first the rank in its bucket, then positions of rows_again, then the length of its row
     std::uint32_t* ranks;
     SphereInstance* sorted;    ///< [n + kReadBeyond] spheres by position
-    std::uint32_t* ids;        ///< [n] their indices, or image_id()
+    std::uint32_t* ids;        ///< [n] their ids
     unsigned long long* sums;  ///< [blocks] spheres in the buckets of each block; direct: its pairs
     CoarseBuckets* coarse;
     std::uint32_t coarse_buckets = kCoarseBuckets;  ///< largest number of coarse buckets in use
@@ -106,9 +106,9 @@ struct GridArgs {
   /// partitioned and partitioned_ids, neighbors, staging.
   struct Scratch {
     SphereInstance* slots;           ///< [kDirectSlots * n] slots of cells; null if n > kMaxDirect
-    std::uint32_t* slot_ids;         ///< [kDirectSlots * n] indices of the spheres there
+    std::uint32_t* slot_ids;         ///< [kDirectSlots * n] ids of the spheres there
     SphereInstance* partitioned;     ///< [n] spheres by coarse bucket
-    std::uint32_t* partitioned_ids;  ///< [n] their indices
+    std::uint32_t* partitioned_ids;  ///< [n] their ids
     std::uint32_t* neighbors;        ///< [n][kSlots] the first b's of a row, by position
     SphereContact* staging;          ///< [capacity] contacts, or neighbors, of short rows
   };

@@ -140,7 +140,8 @@ __device__ void search_directly(const GridArgs& args, const DirectPlan& plan, st
 #pragma unroll
         for (unsigned k = 0; k < kAtOnce; ++k) {
           if (first + k >= ends[2] || !touch(self, others[k])) continue;
-          const std::uint32_t b = sphere_of<kPeriodic>(args.scratch.slot_ids[slot_of(first + k)]);
+          const std::uint32_t b =
+              index_of<kPeriodic>(args.input, args.scratch.slot_ids[slot_of(first + k)]);
           if (b <= a) continue;
           if (kPeriodic && !(excess(self, others[k]) < -doubt)) {
             const std::uint32_t at = atomicAdd(&s.doubtful, 1u);
@@ -162,7 +163,7 @@ __device__ inline void test_doubtful(const GridArgs& args, std::uint32_t first_a
                                      DirectStorage& s) {
   for (unsigned k = threadIdx.x; k < min(s.doubtful, kDirectDoubtful); k += kGridThreads) {
     const std::uint32_t local = s.doubtful_rows[k], slot = s.doubtful_slots[k], a = first_a + local,
-                        b = sphere_of<true>(args.scratch.slot_ids[slot]);
+                        b = index_of<true>(args.input, args.scratch.slot_ids[slot]);
     if (touch_exactly<true>(args.input, a, load_sphere(args.input, a), b,
                             load_sorted(args.scratch.slots + slot))) {
       add_neighbor(local, b, s);

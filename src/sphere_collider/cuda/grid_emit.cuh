@@ -227,10 +227,28 @@ __device__ inline void sort_ids(std::uint32_t* ids, std::uint32_t length) {
   __syncwarp();
 }
 
+/// Writes the contact of a long row to index `at` of the output, and its shift, if the search
+/// writes them.
+template <bool kPeriodic>
+__device__ void write_of_long_row(const GridArgs& args, const SearchOutput& output,
+                                  unsigned long long at, std::uint32_t a, std::uint32_t b,
+                                  const SphereInstance& sphere) {
+  write_contact(output, at, a, b, sphere, load_sphere(args.input, b));
+  if constexpr (kPeriodic) {
+    const PeriodicSpheres& known = *args.input.periodic.known;
+    if (!known.shifts_are_written) return;
+    const CellPoint* const points = output.rows.points;
+    const ImageShift shift =
+        shift_of_points(load_point(points + a), load_point(points + b), known.cell);
+    for (std::size_t k = 0; k < 3; ++k) output.rows.shifts[3 * at + k] = shift[k];
+  }
+}
+
 /// A warp writes a row of up to kMaxLongRow contacts in order. A short row is written by rank
 /// (number of smaller neighbors) instead of sorting.
-__device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& output,
-                                     std::uint32_t a, std::uint32_t* ids) {
+template <bool kPeriodic>
+__device__ void emit_long_row(const GridArgs& args, const SearchOutput& output, std::uint32_t a,
+                              std::uint32_t* ids) {
   constexpr std::uint32_t kFew = 64;
   const unsigned long long offset = args.rows.offsets[a];
   const std::uint32_t length = args.table.ranks[a];
@@ -247,7 +265,7 @@ __device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& o
       rank = 0;
       for (unsigned k = 0; k < length; ++k) rank += ids[k] < b ? 1 : 0;
     }
-    write_contact(output, offset + rank, a, b, sphere, load_sphere(args.input, b));
+    write_of_long_row<kPeriodic>(args, output, offset + rank, a, b, sphere);
   }
   __syncwarp();
 }
@@ -255,9 +273,10 @@ __device__ inline void emit_long_row(const GridArgs& args, const SearchOutput& o
 /// Writes the contacts of a very long row whose neighbors are in [window, window + kWindow), in
 /// order: the neighbors become bits of a set. Windows are independent, so that a row with a million
 /// neighbors is distributed over many blocks.
-__device__ inline void emit_window(const GridArgs& args, const SearchOutput& output,
-                                   std::uint32_t a, unsigned long long offset, std::uint32_t length,
-                                   std::uint32_t window, LongRowStorage& s) {
+template <bool kPeriodic>
+__device__ void emit_window(const GridArgs& args, const SearchOutput& output, std::uint32_t a,
+                            unsigned long long offset, std::uint32_t length, std::uint32_t window,
+                            LongRowStorage& s) {
   for (unsigned w = threadIdx.x; w < kWindowWords; w += kGridThreads) s.words[w] = 0;
   if (threadIdx.x == 0) s.before = 0;
   __syncthreads();
@@ -288,26 +307,29 @@ __device__ inline void emit_window(const GridArgs& args, const SearchOutput& out
   for (unsigned g = threadIdx.x / 32; g < kWindowWords / 32; g += kGridWarps) {
     unsigned long long at = offset + s.before;
     for (unsigned k = 0; k < g; ++k) at += s.group_counts[k];
-    emit_row(output, at, a, sphere, window / 32 + 32 * g, s.words[32 * g + lane_id()],
-             [&](std::uint32_t b) { return load_sphere(args.input, b); });
+    emit_row(at, window / 32 + 32 * g, s.words[32 * g + lane_id()],
+             [&](unsigned long long to, std::uint32_t b) {
+               write_of_long_row<kPeriodic>(args, output, to, a, b, sphere);
+             });
   }
 }
 
 /// First each warp writes a long row, then each block a window of a very long row.
-__device__ inline void emit_long_rows(const GridArgs& args, const SearchOutput& output,
-                                      LongRowStorage& s) {
+template <bool kPeriodic>
+__device__ void emit_long_rows(const GridArgs& args, const SearchOutput& output,
+                               LongRowStorage& s) {
   const unsigned warp = threadIdx.x / 32;
   for (std::uint32_t i = blockIdx.x * kGridWarps + warp; i < args.state->long_rows;
        i += gridDim.x * kGridWarps) {
-    emit_long_row(args, output, args.rows.long_rows[i], s.words + warp * kMaxLongRow);
+    emit_long_row<kPeriodic>(args, output, args.rows.long_rows[i], s.words + warp * kMaxLongRow);
   }
   const std::uint32_t windows = (args.input.n - 1) / kWindow + 1;
   const unsigned long long items = std::uint64_t{args.state->very_long_rows} * windows;
   for (unsigned long long item = blockIdx.x; item < items; item += gridDim.x) {
     __syncthreads();
     const std::uint32_t a = args.rows.very_long_rows[item / windows];
-    emit_window(args, output, a, args.rows.offsets[a], args.table.ranks[a],
-                static_cast<std::uint32_t>(item % windows) * kWindow, s);
+    emit_window<kPeriodic>(args, output, a, args.rows.offsets[a], args.table.ranks[a],
+                           static_cast<std::uint32_t>(item % windows) * kWindow, s);
   }
 }
 

@@ -69,17 +69,18 @@ __device__ void search_and_copy(const GridArgs& args, const SearchOutput& output
   const unsigned warp = threadIdx.x / 32;
   const std::uint64_t warps = std::uint64_t{kGridWarps} * gridDim.x,
                       first_warp = kGridWarps * blockIdx.x + warp;
-  const auto search_crowded = [&]<unsigned kQueries>(std::integral_constant<unsigned, kQueries>) {
-    CrowdedSearcher<kPeriodic, kQueries> searcher(args, output, plan, storage.crowded[warp]);
-    for (std::uint64_t first = kQueries * first_warp; first < args.input.n;
-         first += kQueries * warps) {
+  const auto search_crowded = [&]<bool kOrdered>(std::bool_constant<kOrdered>) {
+    using Searcher = CrowdedSearcher<kPeriodic, kOrdered>;
+    Searcher searcher(args, output, plan, storage.crowded[warp]);
+    for (std::uint64_t first = Searcher::kQueries * first_warp; first < args.input.n;
+         first += Searcher::kQueries * warps) {
       searcher.run(static_cast<std::uint32_t>(first));
     }
   };
-  if (plan.queries == kCrowdedQueries) {
-    search_crowded(std::integral_constant<unsigned, kCrowdedQueries>());
-  } else if (plan.queries == kVeryCrowdedQueries) {
-    search_crowded(std::integral_constant<unsigned, kVeryCrowdedQueries>());
+  if (plan.ordered) {
+    search_crowded(std::bool_constant<true>());
+  } else if (plan.crowded) {
+    search_crowded(std::bool_constant<false>());
   } else if constexpr (kPeriodic) {
     for (std::uint64_t first = 32 * first_warp; first < args.input.n; first += 32 * warps) {
       SingleLevelSearcher<true>(args, output, plan, storage.single[warp])
@@ -97,12 +98,20 @@ __device__ void search_and_copy(const GridArgs& args, const SearchOutput& output
   }
   if (!complete) return;
   const SearchOutput known = with_row_length(args, output);
-  copy_bins(args, known, storage.copy);
+  if (blockIdx.x == 0 && threadIdx.x == 0 && writes_shifts<kPeriodic>(args, output)) {
+    args.input.periodic.known->shifts_are_written = true;
+  }
+  copy_bins<kPeriodic>(args, known, storage.copy);
   if (args.state->overflow == 0) return;
+  grid.sync();
+  visit_bins(args, 1, storage.copy,
+             [&](std::uint32_t bin, unsigned long long before, const BinPart&) {
+               return defer_long_rows(args, bin, before, storage.copy);
+             });
   grid.sync();
   list_long_rows<kPeriodic, 1>(args, plan);
   grid.sync();
-  emit_long_rows(args, known, storage.long_rows);
+  emit_long_rows<kPeriodic>(args, known, storage.long_rows);
 }
 
 /// The phases after the sort, for searches that count the pairs of each sphere.
@@ -128,7 +137,7 @@ __device__ void search_and_emit(const GridArgs& args, const SearchOutput& output
   grid.sync();
   place_overflow(args);
   grid.sync();
-  emit_long_rows(args, known, storage.long_rows);
+  emit_long_rows<false>(args, known, storage.long_rows);
 }
 
 template <bool kPeriodic>
@@ -175,7 +184,11 @@ __global__ void __launch_bounds__(kGridThreads, kOneLaunchBlocks)
   grid.sync();
   scatter(args);
   grid.sync();
-  if (kPeriodic || plan.queries != 0) {
+  if (plan.ordered) {
+    order_cells(args, plan);
+    grid.sync();
+  }
+  if (kPeriodic || plan.crowded) {
     search_and_copy<kPeriodic>(args, output, plan, storage, grid);
   } else {
     search_and_emit(args, output, plan, storage, grid);

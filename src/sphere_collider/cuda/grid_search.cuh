@@ -240,12 +240,13 @@ class Searcher {
       const std::uint32_t key = storage_.rows.keys[slot][thread];
       if (!is_in_row(other, key, storage_.rows.levels[slot][thread])) return;
     }
-    const bool first = sphere_of<kPeriodic>(id) < sphere_of<kPeriodic>(other_id);
-    const std::uint32_t at_a = first ? position : other_position, a = first ? id : other_id,
-                        b = sphere_of<kPeriodic>(first ? other_id : id);
+    const bool first = id < other_id;
+    const std::uint32_t at_a = first ? position : other_position,
+                        a = index_of<kPeriodic>(args_.input, first ? id : other_id),
+                        b = index_of<kPeriodic>(args_.input, first ? other_id : id);
     if constexpr (kPeriodic) {
       // A sphere and an image of a lower one are found as that one and an image of the sphere.
-      if (is_image(a) || a == b) return;
+      if (is_image(first ? id : other_id) || a == b) return;
       const std::uint32_t at_b = first ? other_position : position;
       if (uncertain && !touch_exactly<true>(args_.input, a, load_sorted(args_.table.sorted + at_a),
                                             b, load_sorted(args_.table.sorted + at_b))) {

@@ -117,6 +117,7 @@ class SingleLevelSearcher {
     const SingleLevel level(plan_);
     CellRange near{{0, 0}, {0, -1}, {0, -1}};
     if (exists) id_ = args_.table.ids[position];
+    last_id_ = last_id_of<kPeriodic>(args_.input, id_);
     const bool searching = exists && !(kPeriodic && is_image(id_));
     if (searching) {
       self_ = load_sorted(args_.table.sorted + position);
@@ -187,8 +188,8 @@ class SingleLevelSearcher {
     const bool uncertain = !kPeriodic && __any_sync(kFullWarp, !is_certain);
     std::uint32_t* to = &held(kept_);
     for (const std::uint32_t* from = to; from < top_; from += 32) {
-      const std::uint32_t position = *from, b = neighbor(position);
-      if (b <= id_) continue;
+      const std::uint32_t position = *from;
+      if (id_at(position) <= last_id_) continue;
       if (uncertain && !touch(self_, load_sorted(args_.table.sorted + position))) continue;
       *to = position;
       to += 32;
@@ -200,10 +201,7 @@ class SingleLevelSearcher {
     __syncwarp();
   }
   __device__ std::uint32_t& held(unsigned k) { return s_.held[32 * k + lane_id()]; }
-  /// The sphere at a position, or that which the image there is of.
-  __device__ std::uint32_t neighbor(std::uint32_t position) const {
-    return sphere_of<kPeriodic>(args_.table.ids[position]);
-  }
+  __device__ std::uint32_t id_at(std::uint32_t position) const { return args_.table.ids[position]; }
 
   /// Sorts the first kRanked neighbors by rank (number of smaller neighbors). Inserts further
   /// neighbors, which are rare.
@@ -215,7 +213,7 @@ class SingleLevelSearcher {
       positions[k] = k < kept_ ? held(k) : 0;
     }
 #pragma unroll
-    for (unsigned k = 0; k < kRanked; ++k) ids[k] = k < kept_ ? neighbor(positions[k]) : ~0u;
+    for (unsigned k = 0; k < kRanked; ++k) ids[k] = k < kept_ ? id_at(positions[k]) : ~0u;
 #pragma unroll
     for (unsigned k = 1; k < kRanked; ++k) {
 #pragma unroll
@@ -232,9 +230,9 @@ class SingleLevelSearcher {
       if (k < kept_) held(ranks[k]) = positions[k];
     }
     for (unsigned k = kRanked; k < kept_; ++k) {
-      const std::uint32_t position = held(k), id = neighbor(position);
+      const std::uint32_t position = held(k), id = args_.table.ids[position];
       unsigned to = k;
-      for (; to > 0 && neighbor(held(to - 1)) > id; --to) {
+      for (; to > 0 && id_at(held(to - 1)) > id; --to) {
         held(to) = held(to - 1);
       }
       held(to) = position;
@@ -247,12 +245,13 @@ class SingleLevelSearcher {
     unsigned long long index = 0;
     if (lane_id() == 0) index = atomicAdd(&args_.state->contacts, all);
     index = __shfl_sync(kFullWarp, index, 0);
+    const std::uint32_t row = index_of<kPeriodic>(args_.input, id_);
     if (searching) {
-      args_.rows.offsets[id_] = staged_list(index + sum - kept_, kept_).bits;
-      atomicAdd(&args_.rows.bin_sums[id_ / kBin],
+      args_.rows.offsets[row] = staged_list(index + sum - kept_, kept_).bits;
+      atomicAdd(&args_.rows.bin_sums[row / kBin],
                 static_cast<unsigned long long>(kept_ + not_kept_));
     }
-    if (not_kept_ != 0) record_long_row(args_, id_, position_, not_kept_);
+    if (not_kept_ != 0) record_long_row(args_, row, position_, not_kept_);
     if (index + all <= args_.rows.capacity) write(index, sum, all);
   }
 
@@ -268,7 +267,7 @@ class SingleLevelSearcher {
       const std::uint32_t a = __shfl_sync(kFullWarp, id_, owner);
       if (i < all) {
         const std::uint32_t position = s_.held[32 * slot + owner];
-        const std::uint32_t b = neighbor(position);
+        const std::uint32_t b = args_.table.ids[position];
         const SphereInstance self = load_sorted(args_.table.sorted + first_position + owner);
         write_or_stage(staging_, index + i, a, b, self, load_sorted(args_.table.sorted + position),
                        s_.staged);
@@ -285,6 +284,7 @@ class SingleLevelSearcher {
   SearchOutput staging_;
   SingleLevelStorage& s_;
   std::uint32_t position_ = 0, id_ = 0;
+  std::uint32_t last_id_ = 0;  // last_id_of() id_
   SphereInstance self_;
   Real error_bound_ = 0;                                          // of excess()
   Real doubt_ = 0;                                                // see doubt_of()
@@ -295,8 +295,8 @@ class SingleLevelSearcher {
   bool is_doubtful_ = false;    // of a search in a periodic cell
 };
 
-/// A warp finds the neighbors b > a of the sphere a at a position, and writes up to `capacity` of
-/// them in any order.
+/// A warp finds the neighbors b > a of the sphere a at a position, and writes the ids of up to
+/// `capacity` of them in any order.
 /// @tparam kLoads of candidates in flight per lane
 /// @return the number of neighbors
 template <bool kPeriodic, unsigned kLoads>
@@ -304,7 +304,8 @@ __device__ std::uint32_t list_neighbors(const GridArgs& args, const SingleLevel&
                                         std::uint32_t position, std::uint32_t* neighbors,
                                         std::uint32_t capacity = ~0u) {
   const SphereInstance self = load_sorted(args.table.sorted + position);
-  const std::uint32_t a = args.table.ids[position];
+  const std::uint32_t id = args.table.ids[position],
+                      last_id = last_id_of<kPeriodic>(args.input, id);
   const Real bound = error_bound_of(2 * level.half),
              doubt = doubt_of<kPeriodic>(args.input.periodic, bound, 2 * level.half);
   Rows rows(level.box, neighbor_cells(level, self));
@@ -330,19 +331,20 @@ __device__ std::uint32_t list_neighbors(const GridArgs& args, const SingleLevel&
         const std::uint32_t past = __shfl_sync(kFullWarp, mine.y, owner);
         const std::uint32_t k = past - (__shfl_sync(kFullWarp, sum, owner) - i);
         others[j] = load_sorted(args.table.sorted + (i < candidates ? k : position));
-        ids[j] = i < candidates ? args.table.ids[k] : a;
+        ids[j] = i < candidates ? args.table.ids[k] : id;
       }
 #pragma unroll
       for (unsigned j = 0; j < kLoads; ++j) {
         const Real e = excess(self, others[j]);
-        std::uint32_t b = e > bound ? 0 : sphere_of<kPeriodic>(ids[j]);
-        if (b > a && !(e < -doubt) &&
-            !touch_exactly<kPeriodic>(args.input, a, self, b, others[j])) {
-          b = 0;
+        bool is_neighbor = !(e > bound) && ids[j] > last_id;
+        if (is_neighbor && !(e < -doubt)) {
+          is_neighbor =
+              touch_exactly<kPeriodic>(args.input, index_of<kPeriodic>(args.input, id), self,
+                                       index_of<kPeriodic>(args.input, ids[j]), others[j]);
         }
-        const unsigned found = __ballot_sync(kFullWarp, b > a);
+        const unsigned found = __ballot_sync(kFullWarp, is_neighbor);
         const std::uint32_t at = count + static_cast<std::uint32_t>(__popc(found & lanes_below()));
-        if (b > a && at < capacity) neighbors[at] = b;
+        if (is_neighbor && at < capacity) neighbors[at] = ids[j];
         count += static_cast<std::uint32_t>(__popc(found));
       }
     }
@@ -394,7 +396,8 @@ __device__ void stage_rows_again(const GridArgs& args, const SearchOutput& outpu
   const std::uint32_t rows = args.state->rows_again;
   for (std::uint32_t k = blockIdx.x * kGridWarps + threadIdx.x / 32; k < rows;
        k += gridDim.x * kGridWarps) {
-    const std::uint32_t position = args.table.ranks[k], a = args.table.ids[position];
+    const std::uint32_t position = args.table.ranks[k],
+                        a = index_of<kPeriodic>(args.input, args.table.ids[position]);
     const std::uint32_t length = list_neighbors<kPeriodic, kLoads>(args, level, position, s.row,
                                                                    kMaxStaged),
                         staged = length <= kMaxStaged ? length : 0;
@@ -430,8 +433,15 @@ __device__ void list_long_rows(const GridArgs& args, const GridPlan& plan) {
        k += gridDim.x * kGridWarps) {
     const std::uint32_t a =
         k < long_rows ? args.rows.long_rows[k] : args.rows.very_long_rows[k - long_rows];
-    list_neighbors<kPeriodic, kLoads>(args, level, args.table.positions[a],
-                                      args.rows.long_row_neighbors + args.rows.offsets[a]);
+    std::uint32_t* const neighbors = args.rows.long_row_neighbors + args.rows.offsets[a];
+    const std::uint32_t length =
+        list_neighbors<kPeriodic, kLoads>(args, level, args.table.positions[a], neighbors);
+    if constexpr (kPeriodic) {
+      __syncwarp();
+      for (std::uint32_t i = lane_id(); i < length; i += 32) {
+        neighbors[i] = index_of<true>(args.input, neighbors[i]);
+      }
+    }
   }
 }
 

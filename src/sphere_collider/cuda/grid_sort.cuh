@@ -246,7 +246,12 @@ __device__ inline void sort_coarse(const GridArgs& args, const GridPlan& plan,
     const auto place = [&](std::uint32_t to, std::uint32_t id, const SphereInstance& sphere) {
       args.table.sorted[to] = sphere;
       args.table.ids[to] = id;
-      if (!plan.single && !is_image(id)) args.table.positions[id] = to;
+      if (plan.single) return;
+      if (!args.input.is_periodic()) {
+        args.table.positions[id] = to;
+      } else if (!is_image(id)) {
+        args.table.positions[index_of<true>(args.input, id)] = to;
+      }
     };
     if (fits) {
       for (std::uint32_t i = threadIdx.x; i < past - first; i += blockDim.x) {

@@ -8,10 +8,10 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
 
-/// Location of a row in the staging buffer: index (57 bits) and length (7 bits). For a long row,
+/// Location of a row in the staging buffer: index (56 bits) and length (8 bits). For a long row,
 /// which is not staged, the second field is kNotStaged and the first field is the length.
 struct StagedList {
-  static constexpr unsigned kCountBits = 7, kNotStaged = 127;
+  static constexpr unsigned kCountBits = 8, kNotStaged = 255;
   unsigned long long bits;
   __device__ bool is_long() const { return (bits & kNotStaged) == kNotStaged; }
   __device__ unsigned long long index() const { return bits >> kCountBits; }
@@ -77,7 +77,8 @@ struct CopyStorage {
   // Start of a row in the staging buffer and in the output, each minus its start in the bin.
   unsigned long long from[kGridThreads], to[kGridThreads];
   BlockSums::TempStorage sums;
-  std::uint8_t owners[kOwned];  // rows of kOwned consecutive staged contacts of the bin
+  std::uint8_t owners[kOwned];             // rows of kOwned consecutive staged contacts of the bin
+  std::uint8_t shift_codes[kGridThreads];  // of the spheres of the rows, in a periodic cell
 };
 
 /// A block copies some staged contacts of a bin, whose owners are known, to the output.
@@ -105,23 +106,65 @@ __device__ inline void copy_contacts(const SphereContact* staging, SphereContact
   }
 }
 
-/// The same for pairs, whose second indices are staged. The first row of the bin is first_a.
-__device__ inline void copy_pairs(const std::uint32_t* staging, const SearchOutput& output,
-                                  std::uint32_t first_a, std::uint32_t first, std::uint32_t past,
-                                  const CopyStorage& s) {
+/// Whether the search writes the shifts of pairs in a periodic cell.
+template <bool kPeriodic>
+__device__ bool writes_shifts(const GridArgs& args, const SearchOutput& output) {
+  return kPeriodic && output.rows.shifts != nullptr && args.input.periodic.known->has_shift_codes;
+}
+
+/// Writes the shifts of the pairs of a warp.
+/// @param to index of the pair of this lane in the output
+/// @param codes the shift code of its image, and above it that of its sphere
+/// @param count of the lanes that have a pair
+__device__ inline void write_shifts(std::int32_t* shifts, unsigned long long to,
+                                    std::uint32_t codes, std::uint32_t count) {
+  const unsigned long long first = __shfl_sync(kFullWarp, to, 0);
+  // There is a gap between pairs of rows that precede and follow a long row.
+  const bool has_gap = __any_sync(kFullWarp, lane_id() < count && to != first + lane_id());
+#pragma unroll
+  for (unsigned k = 0; k < 3; ++k) {  // a store of a warp writes consecutive elements
+    const unsigned element = 32 * k + lane_id(), pair = element / 3, axis = element % 3;
+    const std::uint32_t both = __shfl_sync(kFullWarp, codes, static_cast<int>(pair));
+    unsigned long long at = first + pair;
+    if (has_gap) at = __shfl_sync(kFullWarp, to, static_cast<int>(pair));
+    if (pair < count) {
+      __stcs(shifts + 3 * at + axis, shift_between(both >> kShiftBits, both, axis));
+    }
+  }
+}
+
+/// The same for pairs, of whose second spheres or images the ids are staged. The first row of the
+/// bin is first_a.
+template <bool kPeriodic>
+__device__ void copy_pairs(const GridArgs& args, const std::uint32_t* staging,
+                           const SearchOutput& output, std::uint32_t first_a, std::uint32_t first,
+                           std::uint32_t past, const CopyStorage& s) {
   constexpr unsigned kAtOnce = 4;
-  for (std::uint32_t begin = first + threadIdx.x; begin < past; begin += kAtOnce * kGridThreads) {
-    std::uint32_t neighbors[kAtOnce], owners[kAtOnce];
+  const bool has_shifts = writes_shifts<kPeriodic>(args, output);
+  for (std::uint32_t begin = first + threadIdx.x; begin - lane_id() < past;
+       begin += kAtOnce * kGridThreads) {
+    std::uint32_t ids[kAtOnce], owners[kAtOnce];
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
       const std::uint32_t i = min(begin + k * kGridThreads, past - 1);
       owners[k] = s.owners[i - first];
-      neighbors[k] = staging[s.from[owners[k]] + i];
+      ids[k] = staging[s.from[owners[k]] + i];
     }
 #pragma unroll
     for (unsigned k = 0; k < kAtOnce; ++k) {
       const std::uint32_t i = begin + k * kGridThreads;
-      if (i < past) write_pair(output, s.to[owners[k]] + i, first_a + owners[k], neighbors[k]);
+      const unsigned long long to = s.to[owners[k]] + i;
+      if (i < past) {
+        write_pair(output, to, first_a + owners[k], index_of<kPeriodic>(args.input, ids[k]));
+      }
+      if constexpr (kPeriodic) {
+        const std::uint32_t of_warp = i - lane_id();
+        if (has_shifts && of_warp < past) {
+          const std::uint32_t codes =
+              shift_code_of(ids[k]) | std::uint32_t{s.shift_codes[owners[k]]} << kShiftBits;
+          write_shifts(output.rows.shifts, to, codes, past - of_warp);
+        }
+      }
     }
   }
 }
@@ -153,12 +196,35 @@ __device__ inline unsigned long long contacts_before(const GridArgs& args, std::
   return block_sum(mine, s.sums);
 }
 
-/// A block copies the rows of a bin from the staging buffer to the output, after the `before`
-/// contacts of earlier bins, and lists its long rows for a later phase.
+/// A part of the staged contacts of a bin: that with this index, if they are divided evenly.
+struct BinPart {
+  std::uint32_t index = 0, parts = 1;
+};
+
+/// A block lists the long rows of a bin for a later phase. They follow the `before` contacts of
+/// earlier bins.
 /// @return the number of contacts of the bin
-__device__ inline unsigned long long copy_bin(const GridArgs& args, const SearchOutput& output,
-                                              std::uint32_t bin, unsigned long long before,
-                                              CopyStorage& s) {
+__device__ inline unsigned long long defer_long_rows(const GridArgs& args, std::uint32_t bin,
+                                                     unsigned long long before, CopyStorage& s) {
+  const std::uint32_t a = bin * kBin + threadIdx.x;
+  const StagedList list{a < args.input.rows() ? args.rows.offsets[a] : 0};
+  unsigned long long total = 0;
+  const unsigned long long sum =
+      block_exclusive_sum(static_cast<unsigned long long>(list.count()), s.sums, total);
+  if (list.is_long()) {
+    args.table.ranks[a] = list.count();
+    defer_row(args, a, list.count(), before + sum);
+  }
+  return total;
+}
+
+/// A block copies the rows of a bin, or a part of their contacts, from the staging buffer to the
+/// output, after the `before` contacts of earlier bins.
+/// @return the number of contacts of the bin
+template <bool kPeriodic>
+__device__ unsigned long long copy_bin(const GridArgs& args, const SearchOutput& output,
+                                       std::uint32_t bin, unsigned long long before, CopyStorage& s,
+                                       const BinPart& part = {}) {
   const std::uint32_t a = bin * kBin + threadIdx.x;
   const StagedList list{a < args.input.rows() ? args.rows.offsets[a] : 0};
   const std::uint32_t count = list.count(), staged = list.staged();
@@ -173,40 +239,59 @@ __device__ inline unsigned long long copy_bin(const GridArgs& args, const Search
   const auto all = static_cast<std::uint32_t>(total & ((1u << kStagedBits) - 1));
   s.from[threadIdx.x] = list.index() - start;
   s.to[threadIdx.x] = before + (sums >> kStagedBits) - start;
-  if (list.is_long()) {
-    args.table.ranks[a] = count;
-    defer_row(args, a, count, before + (sums >> kStagedBits));
+  if constexpr (kPeriodic) {
+    if (writes_shifts<true>(args, output) && a < args.input.rows()) {
+      s.shift_codes[threadIdx.x] =
+          static_cast<std::uint8_t>(shift_code_of(args.input.periodic.ids[a]));
+    }
   }
-  for (std::uint32_t first = 0; first < all; first += kOwned) {
-    const std::uint32_t past = min(first + kOwned, all);
+  const std::uint32_t end = all * (part.index + 1) / part.parts;
+  for (std::uint32_t first = all * part.index / part.parts; first < end; first += kOwned) {
+    const std::uint32_t past = min(first + kOwned, end);
     for (std::uint32_t k = max(start, first); k < min(start + staged, past); ++k) {
       s.owners[k - first] = static_cast<std::uint8_t>(threadIdx.x);
     }
     __syncthreads();
-    if (output.contacts != nullptr) {
+    if (!kPeriodic && output.contacts != nullptr) {
       copy_contacts(args.scratch.staging, output.contacts, first, past, s);
     } else {
-      copy_pairs(reinterpret_cast<const std::uint32_t*>(args.scratch.staging), output, bin * kBin,
-                 first, past, s);
+      copy_pairs<kPeriodic>(args, reinterpret_cast<const std::uint32_t*>(args.scratch.staging),
+                            output, bin * kBin, first, past, s);
     }
     __syncthreads();
   }
   return total >> kStagedBits;
 }
 
-/// Copies all bins, distributed over all blocks of the kernel.
-__device__ inline void copy_bins(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
-  const std::uint32_t bins = bins_of(args);
-  const std::uint32_t first = std::uint64_t{bins} * blockIdx.x / gridDim.x,
-                      past = std::uint64_t{bins} * (blockIdx.x + 1) / gridDim.x;
+/// Calls visit(bin, before, part) for all parts of all bins, distributed over all blocks of the
+/// kernel. There are `before` contacts in earlier bins. @param visit returns those of the bin
+template <typename Visit>
+__device__ void visit_bins(const GridArgs& args, std::uint32_t parts, CopyStorage& s, Visit visit) {
+  const std::uint64_t all = std::uint64_t{bins_of(args)} * parts;
+  const auto first = static_cast<std::uint32_t>(all * blockIdx.x / gridDim.x),
+             past = static_cast<std::uint32_t>(all * (blockIdx.x + 1) / gridDim.x);
   if (first == past) return;
   unsigned long long mine = 0;
-  for (std::uint32_t k = threadIdx.x; k < first; k += kGridThreads) mine += args.rows.bin_sums[k];
+  for (std::uint32_t k = threadIdx.x; k < first / parts; k += kGridThreads) {
+    mine += args.rows.bin_sums[k];
+  }
   unsigned long long before = block_sum(mine, s.sums);
-  for (std::uint32_t bin = first; bin < past; ++bin) {
-    before += copy_bin(args, output, bin, before, s);
+  for (std::uint32_t i = first; i < past; ++i) {
+    const BinPart part{i % parts, parts};
+    const unsigned long long contacts = visit(i / parts, before, part);
+    if (part.index == parts - 1) before += contacts;
     __syncthreads();
   }
+}
+
+/// Copies all bins, which are divided if there are few.
+template <bool kPeriodic>
+__device__ void copy_bins(const GridArgs& args, const SearchOutput& output, CopyStorage& s) {
+  const std::uint32_t parts = min(max(kCopiesOfBlock * gridDim.x / bins_of(args), 1u), kMaxParts);
+  visit_bins(args, parts, s,
+             [&](std::uint32_t bin, unsigned long long before, const BinPart& part) {
+               return copy_bin<kPeriodic>(args, output, bin, before, s, part);
+             });
 }
 
 }  // namespace cuda

@@ -13,7 +13,7 @@ namespace cuda {
 struct LocalQuery {
   float x, y, z;  ///< -2 p, where p is the centre relative to the origin
   float limit;    ///< S^2 - |p|^2 plus a slack, where S is the largest sum of the radii
-  float doubt;    ///< bound of the excess of pairs that are not certain
+  float doubt;    ///< largest depth of pairs that are not certain
 };
 /// A sphere that may touch the query.
 struct alignas(16) LocalCandidate {
@@ -48,10 +48,10 @@ JFPX_HD inline LocalQuery local_query(const SphereInstance& s, Real largest_radi
           7 * kLocalSlack * fused(sum, sum, p.square)};
 }
 
-/// Approximates the squared distance of the centres minus S^2, where S is the sum of the radii if
-/// the candidate has the largest one. Let e be the result: spheres that touch have e < 0. If the
-/// candidate has the largest radius, spheres with e < -doubt touch. The largest radius must be
-/// within kLeastLocalHalf and kLargestLocalHalf.
+/// Approximates S^2 minus the squared distance of the centres, where S is the sum of the radii if
+/// the candidate has the largest one. Let d be the result: spheres that touch have d > 0. If the
+/// candidate has the largest radius, spheres with d > doubt touch. The largest radius must be within
+/// kLeastLocalHalf and kLargestLocalHalf.
 ///
 /// Proof. u = 2^-24. Underflows are less than 2^-50 S^2 and are contained in the slack.
 ///  1. A component of p and q is rounded at most twice, with an error of at most 1.01u of its
@@ -62,13 +62,13 @@ JFPX_HD inline LocalQuery local_query(const SphereInstance& s, Real largest_radi
 ///     5u |p|^2 + 8u S^2. The last subtraction rounds, but keeps the sign.
 ///  3. The sum is at most 14.3u |q|^2 + 12.2u |p|^2 + 8u S^2. The slack is 24u of each square. The
 ///     exact test rounds the differences of the coordinates, which changes D by at most 2.1u of it,
-///     so that sphere_filter.hpp proves D <= S^2 (1+11.2u) for spheres that touch. So e < 0.
-///  4. Let e < 0. Slack and errors together are E <= 48u (|p|^2 + |q|^2 + S^2), and D <= S^2 + E.
+///     so that sphere_filter.hpp proves D <= S^2 (1+11.2u) for spheres that touch. So d > 0.
+///  4. Let d > 0. Slack and errors together are E <= 48u (|p|^2 + |q|^2 + S^2), and D <= S^2 + E.
 ///     With |q|^2 <= 2 |p|^2 + 2 D follows |q|^2 <= 2.01 (|p|^2 + S^2), hence
-///     E <= 145u (|p|^2 + S^2). `doubt` is at least 167u (|p|^2 + S^2). If e < -doubt then
+///     E <= 145u (|p|^2 + S^2). `doubt` is at least 167u (|p|^2 + S^2). If d > doubt then
 ///     D < S^2 (1-22u), but spheres that do not touch have D >= S^2 (1-8.2u).
-JFPX_HD inline float local_excess(const LocalQuery& p, const LocalCandidate& q) {
-  return fused(p.x, q.x, fused(p.y, q.y, fused(p.z, q.z, q.square))) - p.limit;
+JFPX_HD inline float local_depth(const LocalQuery& p, const LocalCandidate& q) {
+  return p.limit - fused(p.x, q.x, fused(p.y, q.y, fused(p.z, q.z, q.square)));
 }
 
 }  // namespace cuda

@@ -44,16 +44,13 @@ __device__ CellPoint::Cells packed(const ImageShift& cells) {
   }
   return fits ? result : CellPoint::kFarCells;
 }
-/// Number k of packed(), or that of detail::reduce() if they were too large.
-__device__ std::int32_t unpacked(const CellPoint& point, const PeriodicCell& cell, int k) {
-  constexpr std::int32_t kBias = 1 << (CellPoint::kBits - 1);
-  if (point.cells == CellPoint::kFarCells) {
-    Real x = point.centre[k];
-    return detail::reduce(&x, cell.lengths[k]);
-  }
-  const auto bits =
-      static_cast<std::uint32_t>(point.cells >> (CellPoint::kBits * static_cast<unsigned>(k)));
-  return static_cast<std::int32_t>(bits & (2 * kBias - 1)) - kBias;
+/// The id of a sphere, or without the lowest bit that of its image.
+/// @param cells by which the reduced sphere is displaced
+__device__ std::uint32_t id_of(const PeriodicArgs& args, std::size_t i, const ImageShift& shift,
+                               const ImageShift& cells) {
+  const auto index = static_cast<std::uint32_t>(i) << args.index_bit;
+  return has_shift_code(cells) && args.index_bit > 1 ? index | shift_code(shift, cells) << 1
+                                                     : index;
 }
 
 /// @tparam kOfThread spheres of a thread whose loads and stores overlap
@@ -68,12 +65,13 @@ __global__ void __launch_bounds__(kListThreads)
   __shared__ BlockSums::TempStorage sums;
   __shared__ unsigned long long images_before;
   const Real reach = 2 * detail::reduced_radius(largest_radius, args.errors);
-  bool has_bad = false;
+  bool has_bad = false, has_far = false;
   for (std::size_t first = kOfThread * (first_element() - threadIdx.x); first < args.n;
        first += kOfThread * element_stride()) {
     const auto index = [&](unsigned k) { return first + k * kListThreads + threadIdx.x; };
     SphereInstance spheres[kOfThread];
     std::uint32_t codes[kOfThread], count = 0;
+    ImageShift cells[kOfThread] = {};
 #pragma unroll
     for (unsigned k = 0; k < kOfThread; ++k) {
       spheres[k] = load_given(args, index(k) < args.n ? index(k) : 0);
@@ -86,15 +84,16 @@ __global__ void __launch_bounds__(kListThreads)
       args.given[index(k)] = sphere;
       CellPoint point{sphere.centre, 0};
       if (is_valid_in(args.cell, sphere)) {
-        ImageShift cells;
-        sphere = detail::reduced(sphere, args.cell, args.errors, &cells);
-        point.cells = packed(cells);
+        sphere = detail::reduced(sphere, args.cell, args.errors, &cells[k]);
+        point.cells = packed(cells[k]);
         codes[k] = detail::near_images(sphere.centre, args.cell, reach);
+        if (!has_shift_code(cells[k])) has_far = true;
       } else {
         has_bad = true;
       }
       args.points[index(k)] = point;
       args.reduced[index(k)] = sphere;
+      args.ids[index(k)] = id_of(args, index(k), {}, cells[k]);
       count += static_cast<std::uint32_t>(__popc(codes[k]));
     }
     // One atomic for a block: those on one address are serialized.
@@ -106,12 +105,14 @@ __global__ void __launch_bounds__(kListThreads)
     for (unsigned k = 0; k < kOfThread; ++k) {
       for (; codes[k] != 0 && at < args.capacity; codes[k] &= codes[k] - 1, ++at) {
         const auto code = static_cast<std::uint32_t>(__ffs(static_cast<int>(codes[k])) - 1);
-        args.images[at] = image_id(static_cast<std::uint32_t>(index(k)));
-        args.reduced[args.n + at] = detail::image_of(spheres[k], detail::shift_of(code), args.cell);
+        const ImageShift shift = detail::shift_of(code);
+        args.ids[args.n + at] = id_of(args, index(k), shift, cells[k]) | 1;
+        args.reduced[args.n + at] = detail::image_of(spheres[k], shift, args.cell);
       }
     }
   }
   if (__any_sync(kFullWarp, has_bad) && lane_id() == 0) state.has_bad = 1;
+  if (__any_sync(kFullWarp, has_far) && lane_id() == 0) state.has_far = 1;
   if (!is_last_block(state.blocks_passed) || threadIdx.x != 0) return;
   const unsigned long long images = __ldcg(&state.images);
   const bool valid = __ldcg(&state.has_bad) == 0, complete = images <= args.capacity;
@@ -121,8 +122,13 @@ __global__ void __launch_bounds__(kListThreads)
                                           detail::may_touch_twice(reach, args.cell.lengths[k]));
   }
   const bool ready = valid && complete;
-  *args.known = {args.given, args.cell, ready ? args.n + static_cast<std::uint32_t>(images) : 0,
-                 may_touch_twice};
+  *args.known = {
+      .given = args.given,
+      .cell = args.cell,
+      .n = ready ? args.n + static_cast<std::uint32_t>(images) : 0,
+      .may_touch_twice = may_touch_twice,
+      .has_shift_codes = args.index_bit > 1 && __ldcg(&state.has_far) == 0 && !may_touch_twice,
+      .shifts_are_written = false};
   state = {};
   write_signal(args.signal, images, valid, complete);
 }
@@ -132,33 +138,11 @@ __device__ const PeriodicCell& cell_of_sphere(const SpheresInCells& in, std::siz
   return in.cells[system_of(in.offsets, in.systems, static_cast<std::uint32_t>(i))];
 }
 
-/// Loads a point through the read-only cache.
-__device__ CellPoint load_point(const CellPoint* p) {
-  static_assert(sizeof(CellPoint) == sizeof(SphereInstance));
-  return std::bit_cast<CellPoint>(load_sphere(reinterpret_cast<const SphereInstance*>(p)));
-}
-
 /// The shift of spheres a < b that touch.
 __device__ ImageShift shift_of_pair(const SpheresInCells& in, std::uint32_t a, std::uint32_t b) {
   return detail::shift_of_touching(load_sphere(in.spheres + a), load_sphere(in.spheres + b),
                                    cell_of_sphere(in, a));
 }
-/// The same from the points, for spheres that do not touch twice.
-__device__ ImageShift shift_of_points(const CellPoint& p, const CellPoint& q,
-                                      const PeriodicCell& cell) {
-  ImageShift result{};
-#pragma unroll
-  for (int k = 0; k < 3; ++k) {
-    const auto axis = static_cast<std::size_t>(k);
-    if (!cell.repeats[axis]) continue;
-    const std::int32_t of_p = unpacked(p, cell, k), of_q = unpacked(q, cell, k);
-    const Real length = cell.lengths[k], x = detail::displaced(p.centre[k], of_p, length),
-               y = detail::displaced(q.centre[k], of_q, length);
-    result[axis] = of_p - of_q + detail::nearest_shift(x - y, length);
-  }
-  return result;
-}
-
 __global__ void __launch_bounds__(kListThreads)
     make_contacts(const __grid_constant__ SpheresInCells in, const SpherePair* pairs, std::size_t n,
                   SphereContact* contacts) {
@@ -187,6 +171,7 @@ __global__ void __launch_bounds__(kListThreads)
     write_shifts(const __grid_constant__ SpheresInCells in, Pairs found, std::int32_t* shifts,
                  std::size_t capacity) {
   wait_for_previous_kernel();
+  if (in.known != nullptr && in.known->shifts_are_written) return;
   __shared__ std::int32_t staged[kListWarps][3 * 32 * kOfThread];
   std::int32_t* const mine = staged[threadIdx.x / 32];
   const std::size_t n = found.n < capacity ? found.n : capacity;

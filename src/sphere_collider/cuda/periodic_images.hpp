@@ -21,17 +21,8 @@ struct PeriodicState {
   unsigned long long largest_radius;  ///< bits of the largest radius of the given spheres
   unsigned long long images;          ///< number of images, including those beyond the capacity
   std::uint32_t has_bad;        ///< 1: a sphere is invalid, too large for its cell or too far away
+  std::uint32_t has_far;        ///< 1: a sphere is too far from the cell for a shift code
   std::uint32_t blocks_passed;  ///< blocks that have appended their images
-};
-
-/// A given centre, and the cells that its reduced one is displaced by: three numbers, or kFarCells
-/// if they have too many bits.
-struct alignas(sizeof(SphereInstance)) CellPoint {
-  using Cells = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
-  static constexpr unsigned kBits = sizeof(Real) == 4 ? 10 : 21;  ///< of each number
-  static constexpr Cells kFarCells = ~Cells{0};
-  Vec3 centre;
-  Cells cells;
 };
 
 /// The spheres of the last search in periodic cells, in device memory.
@@ -56,7 +47,8 @@ struct PeriodicArgs {
   SphereInstance* given;    ///< [n] receives the spheres
   SphereInstance* reduced;  ///< [n] by detail::reduced(), then the images, up to the capacity
   CellPoint* points;        ///< [n]
-  std::uint32_t* images;    ///< [capacity] image_id() of each
+  std::uint32_t* ids;       ///< [n + capacity] of the spheres and images
+  unsigned index_bit;       ///< lowest bit of the index in an id
   std::uint32_t capacity;
   PeriodicSpheres* known;
   PeriodicState* state;

@@ -16,9 +16,45 @@ __device__ inline bool is_valid_in(const PeriodicCell& cell, const SphereInstanc
 
 /// The id of sphere `i` of the input.
 __device__ inline std::uint32_t id_of(const SphereInput& input, std::uint64_t i) {
-  const PeriodicInput& periodic = input.periodic;
-  return i < periodic.spheres ? static_cast<std::uint32_t>(i)
-                              : periodic.images[i - periodic.spheres];
+  return input.is_periodic() ? input.periodic.ids[i] : static_cast<std::uint32_t>(i);
+}
+/// Whether an id of a search in a periodic cell is that of an image.
+__device__ inline bool is_image(std::uint32_t id) { return (id & 1) != 0; }
+/// The index of the sphere with an id, or of the sphere that the image is of.
+template <bool kPeriodic>
+__device__ std::uint32_t index_of(const SphereInput& input, std::uint32_t id) {
+  return kPeriodic ? id >> input.periodic.index_bit : id;
+}
+/// The highest id with the same index. Ids with a higher index are higher.
+template <bool kPeriodic>
+__device__ std::uint32_t last_id_of(const SphereInput& input, std::uint32_t id) {
+  return kPeriodic ? id | ((1u << input.periodic.index_bit) - 1) : id;
+}
+
+/// The shift code of a sphere or image has two bits for each axis: 2 plus the shift of the image,
+/// minus the cells by which the reduced sphere is displaced. Hence the shift of an image relative
+/// to the given sphere a is the difference of its code and that of a.
+__device__ inline std::uint32_t shift_code(const ImageShift& shift, const ImageShift& cells) {
+  std::uint32_t code = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    code |= static_cast<std::uint32_t>(2 + shift[k] - cells[k]) << 2 * k;
+  }
+  return code;
+}
+/// Whether the sphere and its images have shift codes.
+__device__ inline bool has_shift_code(const ImageShift& cells) {
+  bool result = true;
+  for (std::size_t k = 0; k < 3; ++k) result = result && (cells[k] == 0 || cells[k] == 1);
+  return result;
+}
+__device__ inline std::uint32_t shift_code_of(std::uint32_t id) {
+  return id >> 1 & ((1u << kShiftBits) - 1);
+}
+/// The shift along an axis of the image with the code `of_image`.
+__device__ inline std::int32_t shift_between(std::uint32_t of_sphere, std::uint32_t of_image,
+                                             unsigned axis) {
+  return static_cast<std::int32_t>(of_image >> 2 * axis & 3) -
+         static_cast<std::int32_t>(of_sphere >> 2 * axis & 3);
 }
 
 /// The bound of a filter below which spheres also touch as given, where `bound` is that below which
@@ -36,6 +72,40 @@ template <bool kPeriodic>
 __device__ Real doubt_of(const PeriodicInput& periodic, Real bound, Real largest_sum) {
   if constexpr (!kPeriodic) return bound;
   return bound + largest_sum * fused(largest_sum, periodic.relative_slack, periodic.slack);
+}
+
+/// Number k of CellPoint::cells, or that of detail::reduce() if they were too large.
+__device__ inline std::int32_t unpacked(const CellPoint& point, const PeriodicCell& cell, int k) {
+  constexpr std::int32_t kBias = 1 << (CellPoint::kBits - 1);
+  if (point.cells == CellPoint::kFarCells) {
+    Real x = point.centre[k];
+    return detail::reduce(&x, cell.lengths[k]);
+  }
+  const auto bits =
+      static_cast<std::uint32_t>(point.cells >> (CellPoint::kBits * static_cast<unsigned>(k)));
+  return static_cast<std::int32_t>(bits & (2 * kBias - 1)) - kBias;
+}
+
+/// Loads a point through the read-only cache.
+__device__ inline CellPoint load_point(const CellPoint* p) {
+  static_assert(sizeof(CellPoint) == sizeof(SphereInstance));
+  return std::bit_cast<CellPoint>(load_sphere(reinterpret_cast<const SphereInstance*>(p)));
+}
+
+/// The shift of spheres a < b that touch, but not twice, from their points.
+__device__ inline ImageShift shift_of_points(const CellPoint& p, const CellPoint& q,
+                                             const PeriodicCell& cell) {
+  ImageShift result{};
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    if (!cell.repeats[axis]) continue;
+    const std::int32_t of_p = unpacked(p, cell, k), of_q = unpacked(q, cell, k);
+    const Real length = cell.lengths[k], x = detail::displaced(p.centre[k], of_p, length),
+               y = detail::displaced(q.centre[k], of_q, length);
+    result[axis] = of_p - of_q + detail::nearest_shift(x - y, length);
+  }
+  return result;
 }
 
 /// The test detail::touch_at() of two given spheres a < b, and of the image of b near `image`. Its
@@ -58,12 +128,10 @@ __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInst
       if (shift < 0) return false;  // no such image
       --shift;
     }
-#pragma unroll 1
-    for (int i = 0; i < 2; ++i) {
-      Real in_cell = i == 0 ? x : y;
-      const std::int32_t cells = detail::reduce(&in_cell, length);
-      shift += i == 0 ? cells : -cells;
-    }
+    Real in_cell = x;
+    shift += detail::reduce(&in_cell, length);
+    in_cell = y;
+    shift -= detail::reduce(&in_cell, length);
     const Real difference = detail::image_difference(x, y, shift, length);
     squares += difference * difference;
   }
@@ -75,15 +143,13 @@ __device__ inline bool touches_at(const PeriodicSpheres& known, const SphereInst
 /// from the sphere along an axis, and at its coordinate along the others.
 __device__ inline bool touches_image(const PeriodicSpheres& known, const SphereInstance* reduced,
                                      std::uint32_t a, std::uint32_t b, const Vec3& image) {
+  if (!touches_at(known, reduced, a, b, image, -1)) return false;
   const Real sum = known.given[a].radius + known.given[b].radius;
 #pragma unroll 1
-  for (int lower = -1; lower < 3; ++lower) {
-    if (lower >= 0) {
-      if (!known.cell.repeats[static_cast<std::size_t>(lower)]) continue;
-      if (!detail::may_touch_twice(sum, known.cell.lengths[lower])) continue;
-    }
-    const bool expected = lower < 0;
-    if (touches_at(known, reduced, a, b, image, lower) != expected) return false;
+  for (int k = 0; k < 3; ++k) {
+    if (!known.cell.repeats[static_cast<std::size_t>(k)]) continue;
+    if (!detail::may_touch_twice(sum, known.cell.lengths[k])) continue;
+    if (touches_at(known, reduced, a, b, image, k)) return false;
   }
   return true;
 }

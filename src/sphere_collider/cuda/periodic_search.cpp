@@ -32,14 +32,14 @@ std::uint32_t PeriodicSearch::capacity_for(std::size_t n) const {
 bool PeriodicSearch::fits(std::size_t n) const {
   const std::size_t images = capacity_for(n);
   return state_.capacity() != 0 && n + images <= reduced_.capacity() && n <= points_.capacity() &&
-         images <= images_.capacity();
+         n + images <= ids_.capacity();
 }
 
 void PeriodicSearch::reserve(std::size_t n) {
   const std::size_t images = capacity_for(n);
   reduced_.reserve_geometric(pool_, stream_, n + images, "reduced spheres and images");
   points_.reserve_geometric(pool_, stream_, n, "centres");
-  images_.reserve_geometric(pool_, stream_, images, "images");
+  ids_.reserve_geometric(pool_, stream_, n + images, "ids of spheres and images");
   known_.reserve(pool_, stream_, 1, "cells");
   if (state_.reserve(pool_, stream_, 1, "states of searches")) is_cleared_ = false;
 }
@@ -56,7 +56,8 @@ void PeriodicSearch::enqueue(const SphereArrays& first, const SphereArrays& seco
            .given = given,
            .reduced = reduced_.data(),
            .points = points_.data(),
-           .images = images_.data(),
+           .ids = ids_.data(),
+           .index_bit = n <= kMaxWithShifts ? 1 + kShiftBits : 1,
            .capacity = capacity_for(n),
            .known = known_.data(),
            .state = state_.data(),
@@ -86,7 +87,8 @@ SphereInput PeriodicSearch::input_on_device() const {
           .periodic = {.known = known_.data(),
                        .is_one_launch = true,
                        .spheres = args_.n,
-                       .images = images_.data(),
+                       .ids = ids_.data(),
+                       .index_bit = args_.index_bit,
                        .slack = Real(2.1) * least,
                        .relative_slack = 40 * kEpsilon}};
 }

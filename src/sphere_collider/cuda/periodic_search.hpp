@@ -53,7 +53,7 @@ class PeriodicSearch {
   SearchSignal signal_;
   DeviceBuffer<SphereInstance> reduced_;
   DeviceBuffer<CellPoint> points_;
-  DeviceBuffer<std::uint32_t> images_;
+  DeviceBuffer<std::uint32_t> ids_;
   DeviceBuffer<PeriodicState> state_;
   DeviceBuffer<PeriodicSpheres> known_;
 };

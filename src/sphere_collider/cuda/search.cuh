@@ -111,21 +111,20 @@ __device__ inline void write_count(const SearchOutput& output, unsigned long lon
   if (output.signal != nullptr) write_signal(output.signal, contacts, valid, complete);
 }
 
-/// A warp writes the contacts of row `a`, given as 32 words of a bit mask, one word per lane: lane
-/// l holds the neighbors 32*(first_word + l) to +31.
+/// A warp writes the contacts of a row, given as 32 words of a bit mask, one word per lane: lane l
+/// holds the neighbors 32*(first_word + l) to +31.
+/// @param write write(at, b) writes the contact with b to index `at` of the output
 /// @return the output index after the last contact.
-template <typename LoadSphere>
-__device__ inline unsigned long long emit_row(const SearchOutput& output, unsigned long long at,
-                                              std::uint32_t a, const SphereInstance& sa,
-                                              std::uint32_t first_word, std::uint32_t my_word,
-                                              LoadSphere load) {
+template <typename Write>
+__device__ inline unsigned long long emit_row(unsigned long long at, std::uint32_t first_word,
+                                              std::uint32_t my_word, Write write) {
   for (unsigned left = __ballot_sync(kFullWarp, my_word != 0); left != 0; left &= left - 1) {
     const int owner = __ffs(static_cast<int>(left)) - 1;
     const unsigned word = __shfl_sync(kFullWarp, my_word, owner);
     if ((word >> lane_id() & 1u) != 0) {
       const std::uint32_t b = 32 * (first_word + static_cast<std::uint32_t>(owner)) + lane_id();
       const auto rank = static_cast<unsigned>(__popc(word & lanes_below()));
-      write_contact(output, at + rank, a, b, sa, load(b));
+      write(at + rank, b);
     }
     at += static_cast<unsigned>(__popc(word));
   }

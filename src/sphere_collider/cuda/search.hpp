@@ -52,18 +52,23 @@ struct PeriodicSpheres {
   PeriodicCell cell;
   std::uint32_t n;       ///< number of reduced spheres and images; 0: some are invalid or missing
   bool may_touch_twice;  ///< whether two spheres may touch through two images
+  /// Whether the ids have shift codes, and two spheres touch through one image at most, so that the
+  /// codes of a pair determine its shift.
+  bool has_shift_codes;
+  bool shifts_are_written;  ///< by the search
 };
 /// Search in a periodic cell: the first spheres of the input are reduced to the cell
 /// (periodic_cell.hpp), and the others are images of these. Pairs are tested as given.
 struct PeriodicInput {
-  const PeriodicSpheres* known = nullptr;  ///< in device memory; null: not in a cell
+  PeriodicSpheres* known = nullptr;  ///< in device memory; null: not in a cell
   /// The search is one launch, and the number of spheres is a limit; the exact one is `known->n`.
   /// The result is not valid if that is 0, or if the spheres need several launches: several levels
   /// of the grid, or a hashed table of cells.
   bool is_one_launch = false;
-  std::uint32_t spheres = ~0u;            ///< number of reduced spheres
-  const std::uint32_t* images = nullptr;  ///< [n - spheres] image_id() of the others
-  Real slack = 0, relative_slack = 0;     ///< see doubt_of()
+  std::uint32_t spheres = ~0u;         ///< number of reduced spheres
+  const std::uint32_t* ids = nullptr;  ///< [n] ids of the spheres and images
+  unsigned index_bit = 0;              ///< lowest bit of the index in an id
+  Real slack = 0, relative_slack = 0;  ///< see doubt_of()
 };
 
 /// Spheres of a search, in device memory.
@@ -77,21 +82,32 @@ struct SphereInput {
   JFPX_HD std::uint32_t rows() const { return n < periodic.spheres ? n : periodic.spheres; }
 };
 
-/// The index of a sphere, or that of the sphere that an image is of, with the highest bit.
-inline constexpr std::uint32_t kImageBit = std::uint32_t{1} << 31;
-static_assert(kMaxSpheres <= kImageBit);
-JFPX_HD inline std::uint32_t image_id(std::uint32_t sphere) { return sphere | kImageBit; }
-JFPX_HD inline bool is_image(std::uint32_t id) { return (id & kImageBit) != 0; }
-template <bool kPeriodic>
-JFPX_HD std::uint32_t sphere_of(std::uint32_t id) {
-  return kPeriodic ? id & ~kImageBit : id;
-}
+/// In a periodic cell, the id of a sphere or image has, from the highest bits, the index of the
+/// sphere, a shift code unless there are more than kMaxWithShifts spheres, and 1 for an image. In
+/// other searches, the id of a sphere is its index.
+inline constexpr unsigned kShiftBits = 6;
+inline constexpr std::uint32_t kMaxWithShifts = std::uint32_t{1} << (31 - kShiftBits);
+static_assert(kMaxSpheres <= std::uint32_t{1} << 31);
+
+/// A given centre, and the cells that its reduced one is displaced by: three numbers, or kFarCells
+/// if they have too many bits.
+struct alignas(sizeof(SphereInstance)) CellPoint {
+  using Cells = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
+  static constexpr unsigned kBits = sizeof(Real) == 4 ? 10 : 21;  ///< of each number
+  static constexpr Cells kFarCells = ~Cells{0};
+  Vec3 centre;
+  Cells cells;
+};
 
 /// Pairs as two rows of indices: all a's, then all b's.
 struct IndexRows {
   void* indices = nullptr;  ///< std::int32_t, or std::int64_t if `is_wide`
   bool is_wide = false;
   unsigned long long length = 0;  ///< of a row: the number of pairs, which the kernels set
+  /// Of a search in a periodic cell, or null: receives the shifts of the b's, unless
+  /// PeriodicSpheres::shifts_are_written is false after the search.
+  std::int32_t* shifts = nullptr;
+  const CellPoint* points = nullptr;  ///< if there are shifts: of the spheres
 };
 
 /// Destination of the result of a search: one of `contacts`, `pairs`, `rows` or, within a search,

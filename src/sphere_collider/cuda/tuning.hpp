@@ -55,19 +55,20 @@ inline constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
 inline constexpr std::uint32_t kSamples = 4096;
 /// Number of spheres per cell from which a warp searches for several spheres together.
 inline constexpr Real kCrowded = 3;
-/// The same from which it searches for fewer, with more lanes for each.
+/// The same from which cells are as wide in x as in y and z, and the spheres of a cell are sorted.
 inline constexpr Real kVeryCrowded = 15;
-/// Number of spheres that a warp searches for together in both cases.
-inline constexpr unsigned kCrowdedQueries = 8, kVeryCrowdedQueries = 4;
 /// Number of neighbor slots per sphere; further neighbors are appended to a list for all spheres.
 inline constexpr std::uint32_t kSlots = 16;
 /// Largest number of contacts of a row in the staging buffer. No contact of a longer row is staged.
-inline constexpr std::uint32_t kMaxStaged = 124;
+inline constexpr std::uint32_t kMaxStaged = 128;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.
 inline constexpr std::uint32_t kMaxLongRow = 1024;
 /// The single-level search counts contacts in bins of this number of consecutive rows. One block
 /// copies a bin to the output.
 inline constexpr std::uint32_t kBin = 256;
+/// Number of copies of a block in a search in one launch, if bins can be divided into enough parts,
+/// and largest number of parts of a bin.
+inline constexpr unsigned kCopiesOfBlock = 2, kMaxParts = 8;
 /// Number of consecutive bins whose counts are summed before the copy.
 inline constexpr std::uint32_t kBinsOfSum = 64;
 
@@ -79,11 +80,13 @@ inline constexpr unsigned kSortBlocks = 2;
 /// Of the searches. A multiprocessor of Turing has 1024 threads, that is, four blocks.
 inline constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 4 : 3;
 /// Of the copy, which uses all threads.
+template <bool kPeriodic>
 inline constexpr unsigned kCopyBlocks = 4;
 #else
 inline constexpr unsigned kSortBlocks = sizeof(Real) == 4 ? 3 : 2;
 inline constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
-inline constexpr unsigned kCopyBlocks = 8;
+template <bool kPeriodic>
+inline constexpr unsigned kCopyBlocks = kPeriodic ? 4 : 5;
 #endif
 /// Registers for the loads of several candidates are worth more than a fifth block.
 inline constexpr unsigned kCrowdedBlocks = std::min(kSearchBlocks, 4u);

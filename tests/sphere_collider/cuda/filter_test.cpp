@@ -155,8 +155,8 @@ TEST(CudaFilter, LocalExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
     SphereInstance b{a.centre + normalized(point(1)) * ((a.radius + largest) * (1 + gap)), largest};
     if (random.below(4) == 0) std::swap(a.centre, b.centre);
     const cuda::LocalQuery query = cuda::local_query(a, largest, origin);
-    const float excess = cuda::local_excess(query, cuda::local_candidate(b.centre, origin));
-    ASSERT_TRUE(decisions.add(a, b, !(excess < 0), excess < -query.doubt))
+    const float depth = cuda::local_depth(query, cuda::local_candidate(b.centre, origin));
+    ASSERT_TRUE(decisions.add(a, b, !(depth > 0), depth > query.doubt))
         << "pair " << i << ", " << seed_note();
   }
   EXPECT_GT(decisions.touching, 300'000) << "the test must cover touching pairs";

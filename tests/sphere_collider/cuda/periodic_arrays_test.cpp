@@ -4,6 +4,9 @@
 
 #include "tests/sphere_collider/cuda/device_arrays.hpp"
 
+#include <cmath>
+#include <string>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace test {
@@ -258,6 +261,51 @@ TEST_F(Cuda, PairsInAPeriodicCellAreWrittenToArraysOfTheCaller) {
     const auto expected = find_periodic_contacts(*cpu, spheres, cell);
     expect_pairs_in_arrays<std::int32_t>(collider, spheres, cell, expected);
     expect_pairs_in_arrays<std::int64_t>(collider, spheres, cell, expected);
+  }
+}
+
+/// `n` spheres in the cell or half a length above it.
+Spheres gas_near(const PeriodicCell& cell, std::size_t n, Real radius, Random& random) {
+  Spheres spheres(n);
+  for (SphereInstance& s : spheres) {
+    for (int k = 0; k < 3; ++k) {
+      s.centre[k] = random.uniform(Real(-0.5), Real(1.5)) * cell.lengths[k];
+    }
+    s.radius = radius;
+  }
+  return spheres;
+}
+
+/// The search itself writes the shifts of staged and of long rows, if no sphere is far from the
+/// cell.
+TEST_F(Cuda, PairsNearAPeriodicCellAreWrittenToArraysOfTheCaller) {
+  Random random(base_seed());
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const PeriodicCell cell{{8, 9, Real(7.5)}, {true, random.below(2) == 0, true}};
+  struct Case {
+    std::size_t spheres;
+    double neighbors;  // of a sphere, on average
+  };
+  for (const Case& c : {Case{30'000, 3},
+                        {30'000, 30},
+                        {30'000, 100},
+                        {12'000, 300},
+                        {5'000, 1200},
+                        {300'000, 12},
+                        {300'000, 40}}) {
+    SCOPED_TRACE(std::to_string(c.spheres) + " spheres, " + std::to_string(c.neighbors) +
+                 " neighbors, " + seed_note());
+    const double volume = 8 * 9 * 7.5 / static_cast<double>(c.spheres);
+    const auto radius = static_cast<Real>(std::cbrt(c.neighbors * volume / (4.19 * 8)));
+    Spheres spheres = gas_near(cell, c.spheres, radius, random);
+    const auto expected = find_periodic_contacts(*cpu, spheres, cell);
+    expect_pairs_in_arrays<std::int32_t>(collider, spheres, cell, expected);
+    if (c.spheres > 30'000) continue;
+    expect_pairs_in_arrays<std::int64_t>(collider, spheres, cell, expected);
+    spheres[random.below(spheres.size())].centre.x -= 2 * cell.lengths.x;
+    expect_pairs_in_arrays<std::int32_t>(collider, spheres, cell,
+                                         find_periodic_contacts(*cpu, spheres, cell));
   }
 }
 
