@@ -72,9 +72,14 @@ __device__ void search_and_copy(const GridArgs& args, const SearchOutput& output
   const auto search_crowded = [&]<bool kOrdered>(std::bool_constant<kOrdered>) {
     using Searcher = CrowdedSearcher<kPeriodic, kOrdered>;
     Searcher searcher(args, output, plan, storage.crowded[warp]);
-    for (std::uint64_t first = Searcher::kQueries * first_warp; first < args.input.n;
-         first += Searcher::kQueries * warps) {
-      searcher.run(static_cast<std::uint32_t>(first));
+    const std::uint32_t groups = (args.input.n - 1) / Searcher::kQueries + 1;
+    for (auto group = static_cast<std::uint32_t>(first_warp); group < groups;) {
+      std::uint32_t taken = 0;  // known after the search
+      if (kOrdered && lane_id() == 0) taken = atomicAdd(&args.state->groups_taken, 1u);
+      searcher.run(Searcher::kQueries * group);
+      // The atomics are worth their time only for long searches.
+      group =
+          static_cast<std::uint32_t>(warps) + (kOrdered ? __shfl_sync(kFullWarp, taken, 0) : group);
     }
   };
   if (plan.ordered) {

@@ -50,8 +50,8 @@ JFPX_HD inline LocalQuery local_query(const SphereInstance& s, Real largest_radi
 
 /// Approximates S^2 minus the squared distance of the centres, where S is the sum of the radii if
 /// the candidate has the largest one. Let d be the result: spheres that touch have d > 0. If the
-/// candidate has the largest radius, spheres with d > doubt touch. The largest radius must be within
-/// kLeastLocalHalf and kLargestLocalHalf.
+/// candidate has the largest radius, spheres with d > doubt touch. The largest radius must be
+/// within kLeastLocalHalf and kLargestLocalHalf.
 ///
 /// Proof. u = 2^-24. Underflows are less than 2^-50 S^2 and are contained in the slack.
 ///  1. A component of p and q is rounded at most twice, with an error of at most 1.01u of its

@@ -37,6 +37,7 @@ struct alignas(16) SearchState {
   std::uint32_t long_rows;           ///< entries of GridArgs::Rows::long_rows
   std::uint32_t very_long_rows;      ///< entries of GridArgs::Rows::very_long_rows
   std::uint32_t rows_again;          ///< entries of Table::ranks: see list_row_again()
+  std::uint32_t groups_taken;        ///< of crowded spheres, after the first of each warp
   std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
   std::uint32_t blocks_sampled;      ///< blocks that have finished their part of the sample
   std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
