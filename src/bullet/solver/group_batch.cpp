@@ -22,8 +22,6 @@ using Clock = std::chrono::steady_clock;
 
 /// First of the two alternatives of a chooser; the other is to solve one group after the other.
 constexpr std::size_t kConcurrent = 0;
-/// [us], shorter than the time of any group, so that the chooser measures both alternatives.
-constexpr double kFewestUsPerManifold = 1e-3;
 /// Threads divide the rows of larger groups. A GPU may solve them, if there is one.
 constexpr std::size_t kMostManifolds = kSharedManifolds;
 /// Fewer manifolds take less time than waking threads.
@@ -87,8 +85,7 @@ void solve_group(btConstraintSolver& solver, const SolverGroup& group,
 }
 
 GroupBatch::GroupBatch(const ConstraintSolverOptions& options)
-    : options_{.backend = Backend::cpu, .threads = 1, .simd = options.simd, .minimum_batch = 0},
-      choosers_(33, TimeChooser(2)) {}
+    : options_{.backend = Backend::cpu, .threads = 1, .simd = options.simd, .minimum_batch = 0} {}
 GroupBatch::~GroupBatch() = default;
 
 GroupBatch* GroupBatch::of(btConstraintSolver& solver) {
@@ -103,14 +100,9 @@ void GroupBatch::solve(ConstraintSolver& solver, std::span<const SolverGroup> gr
   solver.impl_->set_mode(info);
   bool is_concurrent = select(solver, groups, info);
   const bool has_choice = is_concurrent && solver.minimum_batch() > 0;
-  TimeChooser& chooser =
-      choosers_[std::min<std::size_t>(choosers_.size() - 1, std::bit_width(manifolds_))];
-  const double predicted_us = kFewestUsPerManifold * static_cast<double>(manifolds_);
   Clock::time_point start;
   if (has_choice) {
-    const std::array predicted{predicted_us, predicted_us};
-    is_concurrent =
-        chooser.choose(static_cast<double>(manifolds_), predicted).alternative == kConcurrent;
+    is_concurrent = chooser_.choose(manifolds_) == kConcurrent;
     start = Clock::now();
   }
   if (is_concurrent) run(solver, groups, info);
@@ -123,7 +115,7 @@ void GroupBatch::solve(ConstraintSolver& solver, std::span<const SolverGroup> gr
   }
   if (!has_choice) return;
   const std::chrono::duration<double, std::micro> us = Clock::now() - start;
-  chooser.record(us.count(), predicted_us);
+  chooser_.record(us.count());
 }
 
 /// Selects the groups to solve concurrently. @returns whether there are enough

@@ -3,8 +3,8 @@
 
 #include <jfpx/bullet/constraint_solver.hpp>
 
+#include "src/base/sized_chooser.hpp"
 #include "src/base/thread_pool.hpp"
-#include "src/base/time_chooser.hpp"
 
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 
@@ -76,7 +76,7 @@ class GroupBatch {
   std::size_t manifolds_ = 0;                     ///< of these groups
   std::vector<Outcome> outcomes_;                 ///< by group
   /// Between solving groups concurrently and one after the other, by number of bits of manifolds_.
-  std::vector<TimeChooser> choosers_;
+  SizedChooser chooser_;
 };
 
 }  // namespace bullet

@@ -1,8 +1,6 @@
 /// Measured choice of the code that solves a group.
 #include "src/bullet/solver/group_choice.hpp"
 
-#include <algorithm>
-#include <array>
 #include <bit>
 
 namespace jfpx {
@@ -12,36 +10,31 @@ namespace {
 
 /// First alternative, because the chooser then replaces it only for a clear gain.
 constexpr std::size_t kBullet = 0;
-/// [us], shorter than the time of any group, so that the chooser measures both alternatives.
-constexpr double kLowerBoundUsPerManifold = 1e-3;
+
+std::size_t bits_of(std::size_t manifolds) {
+  return static_cast<std::size_t>(std::bit_width(manifolds));
+}
 
 }  // namespace
 
-GroupChoice::Size& GroupChoice::size_of(std::size_t manifolds) {
-  return sizes_[std::min<std::size_t>(sizes_.size() - 1, std::bit_width(manifolds))];
-}
-
 bool GroupChoice::leaves_to_bullet(std::size_t manifolds) {
-  Size& size = size_of(manifolds);
-  timed_ = size.fills_lanes ? nullptr : &size;
-  if (timed_ == nullptr) return false;
-  predicted_us_ = kLowerBoundUsPerManifold * static_cast<double>(manifolds);
-  const std::array predicted{predicted_us_, predicted_us_};
-  const auto decision = size.chooser.choose(static_cast<double>(manifolds), predicted);
+  is_measured_ = !fills_lanes_[bits_of(manifolds)];
+  if (!is_measured_) return false;
+  const bool result = chooser_.choose(manifolds) == kBullet;
   since_ = Clock::now();
-  return decision.alternative == kBullet;
+  return result;
 }
 
 void GroupChoice::note_lanes(std::size_t manifolds, std::size_t contacts, std::size_t blocks,
                              std::size_t lanes, std::size_t joints) {
-  size_of(manifolds).fills_lanes =
+  fills_lanes_[bits_of(manifolds)] =
       lanes > 1 && 2 * contacts >= lanes * blocks && contacts >= 2 * joints;
 }
 
 void GroupChoice::finished() {
-  if (timed_ == nullptr) return;
+  if (!is_measured_) return;
   const std::chrono::duration<double, std::micro> us = Clock::now() - since_;
-  timed_->chooser.record(us.count(), predicted_us_);
+  chooser_.record(us.count());
 }
 
 }  // namespace bullet

@@ -1,10 +1,10 @@
 /// Choice between Bullet's own code and that of jfpx for groups with little parallelism.
 #pragma once
 
-#include "src/base/time_chooser.hpp"
+#include "src/base/sized_chooser.hpp"
 
+#include <bitset>
 #include <chrono>
-#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -25,16 +25,11 @@ class JFPX_BULLET_API GroupChoice {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Size {
-    TimeChooser chooser{2};
-    bool fills_lanes = true;  ///< initial value, because jfpx solves the first group
-  };
 
-  Size& size_of(std::size_t manifolds);
-
-  std::vector<Size> sizes_ = std::vector<Size>(33);  ///< by number of bits of the manifolds
-  Size* timed_ = nullptr;  ///< of the group whose time is measured, if any
-  double predicted_us_ = 0;
+  /// By number of bits of the manifolds. Initially true, because jfpx solves the first group.
+  std::bitset<65> fills_lanes_ = ~std::bitset<65>();
+  SizedChooser chooser_;
+  bool is_measured_ = false;  ///< the group for which leaves_to_bullet() was last called
   Clock::time_point since_;
 };
 

@@ -31,8 +31,6 @@ constexpr std::uint64_t kWaitsForOthers = 200;
 constexpr std::size_t kSample = 256;
 /// First of the two alternatives of the chooser; the other is one thread.
 constexpr std::size_t kSeveralThreads = 0;
-/// [us], shorter than any sweep over a block, so that the chooser measures both alternatives.
-constexpr double kLowerBoundBlockUs = 1e-4;
 
 double us_since(Clock::time_point start) {
   return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
@@ -259,9 +257,9 @@ void RowSolver::schedule(std::span<const RowPair> pairs, std::uint32_t direction
   coloring_.build(pairs, body_count_);
   pairs_ = pairs;
   choose_parts();
-  const auto start = chooser_ != nullptr ? Clock::now() : Clock::time_point{};
+  const auto start = is_measured_ ? Clock::now() : Clock::time_point{};
   if (parts_ > 1) divide_bodies();
-  if (chooser_ != nullptr) division_us_ = us_since(start);
+  if (is_measured_) division_us_ = us_since(start);
   const std::uint32_t lanes = kernels_.lanes;
   assign_groups();
   const std::size_t groups = group_count();
@@ -351,13 +349,8 @@ void RowSolver::choose_parts() {
   const std::size_t most =
       std::min(blocks / kBlocksPerThread, blocks / (kBlocksPerPart * std::max(colors(), 1u)));
   parts_ = static_cast<std::uint32_t>(std::clamp<std::size_t>(most, 1, std::size_t{most_parts_}));
-  chooser_ = nullptr;
-  if (parts_ == 1) return;
-  chooser_ = &choosers_[std::bit_width(blocks)];
-  predicted_us_ = kLowerBoundBlockUs * static_cast<double>(blocks);
-  const std::array predicted{predicted_us_, predicted_us_};
-  const auto decision = chooser_->choose(static_cast<double>(blocks), predicted);
-  if (decision.alternative != kSeveralThreads) parts_ = 1;
+  is_measured_ = parts_ > 1;
+  if (is_measured_ && chooser_.choose(blocks) != kSeveralThreads) parts_ = 1;
 }
 
 /// Divides the bodies into parts of about equal numbers along the longest axis, so that few
@@ -533,7 +526,7 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
   }
   // The first participant always stays, so that the work is completed. Other participants leave
   // after a long wait: more threads than free processors only delay the working threads.
-  const auto start = chooser_ != nullptr ? Clock::now() : Clock::time_point{};
+  const auto start = is_measured_ ? Clock::now() : Clock::time_point{};
   pool_.run(parts_, [&](std::size_t participant) {
     const auto self = static_cast<std::uint32_t>(participant);
     const Backoff backoff(self == 0);
@@ -544,9 +537,8 @@ RowSweepReport RowSolver::solve(const RowSweepSettings& settings, bool with_fact
 
   RowSweepReport report;
   report.iterations = main.iterations_done();
-  if (chooser_ != nullptr) {
-    const double us = division_us_ + us_since(start);
-    chooser_->record(us / (report.iterations + 1), predicted_us_);
+  if (is_measured_) {
+    chooser_.record((division_us_ + us_since(start)) / (report.iterations + 1));
   }
   if (report.iterations > 0) {
     report.residual = residuals_[static_cast<std::size_t>(report.iterations) - 1];

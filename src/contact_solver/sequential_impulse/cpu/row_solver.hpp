@@ -6,8 +6,8 @@
 #include <jfpx/simd_level.hpp>
 
 #include "src/base/buffer.hpp"
+#include "src/base/sized_chooser.hpp"
 #include "src/base/thread_pool.hpp"
-#include "src/base/time_chooser.hpp"
 #include "src/contact_solver/sequential_impulse/coloring.hpp"
 #include "src/contact_solver/sequential_impulse/cpu/row_kernels.hpp"
 
@@ -210,11 +210,9 @@ class JFPX_API RowSolver {
   std::size_t residual_capacity_ = 0;
   std::uint32_t most_parts_ = 1;
   std::unique_ptr<PartProgress[]> progress_;  ///< by program and part
-  /// Choosers between several threads and one, by the bit width of the number of blocks.
-  std::vector<TimeChooser> choosers_ = std::vector(33, TimeChooser(2));
-  TimeChooser* chooser_ = nullptr;  ///< null: a single thread is used
-  double predicted_us_ = 0;         ///< [us], of an iteration
-  double division_us_ = 0;          ///< [us], of the division of the bodies
+  SizedChooser chooser_;      ///< of several threads or one, by the number of blocks
+  bool is_measured_ = false;  ///< whether the chooser needs the time of an iteration
+  double division_us_ = 0;    ///< [us], of the division of the bodies
 };
 
 }  // namespace cpu
