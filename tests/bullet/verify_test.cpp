@@ -90,6 +90,11 @@ TEST_F(TwoWorlds, EveryFieldOfAPointIsCompared) {
   changes("m_lateralFrictionDir2.z", &p.m_lateralFrictionDir2.m_floats[2], x);
 }
 
+TEST_F(TwoWorlds, WhatBulletDoesNotInitializeIsNotCompared) {
+  point().m_normalWorldOnB.setW(7);
+  EXPECT_FALSE(first_difference(a_.world, b_.world, 1));
+}
+
 TEST_F(TwoWorlds, ZeroAndMinusZeroDiffer) {
   ASSERT_EQ(point().m_normalWorldOnB.z(), 0);
   point().m_normalWorldOnB.setZ(-point().m_normalWorldOnB.z());

@@ -31,7 +31,9 @@ JFPX_BULLET_API std::string to_text(const Difference& difference);
 
 /// Compares two worlds bit by bit: all manifolds in the order of the dispatchers' arrays, with
 /// their bodies, thresholds and every field of every point (for m_userPersistentData, only whether
-/// it is set); then all bodies in array order with transforms, velocities and activation.
+/// it is set, and not the unused component of the normal, which Bullet does not initialize for two
+/// capsules at one place); then all bodies in array order with transforms, velocities and
+/// activation.
 /// @param step is copied into the result.
 /// @return the first difference; empty if the worlds are identical.
 JFPX_BULLET_API std::optional<Difference> first_difference(btDynamicsWorld& expected,

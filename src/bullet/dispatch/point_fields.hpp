@@ -70,7 +70,9 @@ inline void compare_points(const btManifoldPoint& e, const btManifoldPoint& a, F
   (*c)("m_localPointB", e.m_localPointB, a.m_localPointB);
   (*c)("m_positionWorldOnB", e.m_positionWorldOnB, a.m_positionWorldOnB);
   (*c)("m_positionWorldOnA", e.m_positionWorldOnA, a.m_positionWorldOnA);
-  (*c)("m_normalWorldOnB", e.m_normalWorldOnB, a.m_normalWorldOnB);
+  // Bullet does not initialize the unused component of the normal of two capsules at one place.
+  const auto used = [](const btVector3& v) { return btVector3(v.x(), v.y(), v.z()); };
+  (*c)("m_normalWorldOnB", used(e.m_normalWorldOnB), used(a.m_normalWorldOnB));
   (*c)("m_distance1", e.m_distance1, a.m_distance1);
   (*c)("m_combinedFriction", e.m_combinedFriction, a.m_combinedFriction);
   (*c)("m_combinedRollingFriction", e.m_combinedRollingFriction, a.m_combinedRollingFriction);
