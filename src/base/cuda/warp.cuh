@@ -7,6 +7,7 @@
 #include <jfpx/config.hpp>
 
 #include <bit>
+#include <concepts>
 #include <cstdint>
 
 namespace jfpx {

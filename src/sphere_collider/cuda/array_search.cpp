@@ -115,6 +115,7 @@ std::optional<std::uint64_t> ArraySearch::search_to(const SphereInput& input,
   }
 }
 
+/// The same for pairs in arrays with room for `capacity`, which may be exceeded by the number.
 std::optional<std::uint64_t> ArraySearch::search_to_rows(const SphereInput& input,
                                                          const IndexRows& to, std::size_t capacity,
                                                          Stream user) {

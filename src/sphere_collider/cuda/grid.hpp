@@ -81,7 +81,8 @@ struct GridArgs {
   struct Table {
     std::uint32_t size;        ///< largest number of buckets: a power of two
     std::uint32_t* starts;     ///< [size + 1] histogram, then first positions, of the buckets
-    std::uint32_t* positions;  ///< [n] first the bucket, then the position, of a sphere
+    std::uint32_t* positions;  ///< [n] first the bucket, then the position, of a sphere; on one
+                               ///< level, only of long rows
     /// [n] first the rank in its bucket, then positions of rows_again, then the length of its row
     std::uint32_t* ranks;
     SphereInstance* sorted;    ///< [n + kReadBeyond] spheres by position

@@ -14,11 +14,11 @@ inline constexpr unsigned kCandidates = 128;
 inline constexpr unsigned kLoads = kCandidates / 32;  // of a lane
 /// Largest number of neighbors that a lane keeps.
 inline constexpr unsigned kMaxOfLane = 19;
-/// Largest number of cells along an axis around the spheres of one cell c. A search radius is one
-/// cell wide. Coordinates have at most kMaxCells cells, so a sum is rounded by at most 1/4 cell,
-/// and so is a product of cell_of(). The products of the spheres themselves are between c - 1/4 and
-/// c + 1. Those of the ends of the range are between c - 1.75 and c + 2.5, up to 2^-19: their cells
-/// are c - 2 to c + 2.
+/// Largest number of cells in y or z around the spheres of one cell c. A search radius is one cell
+/// wide. Coordinates have at most kMaxCells cells, so a sum is rounded by at most 1/4 cell, and so
+/// is a product of cell_of(). The products of the spheres themselves are between c - 1/4 and c + 1.
+/// Those of the ends of the range are between c - 1.75 and c + 2.5, up to 2^-19: their cells are
+/// c - 2 to c + 2.
 inline constexpr unsigned kMaxRows = 5;
 
 /// Largest number of spheres of a cell that order_cells() sorts.
@@ -97,7 +97,7 @@ struct CrowdedStorage {
   };
   union {
     Candidates candidates;
-    std::uint32_t rows[32 * kMaxOfLane];  // after the search: the b's of all queries
+    std::uint32_t rows[32 * kMaxOfLane];  // after the search: the ids of all neighbors
   };
   std::uint32_t found[32 * kMaxOfLane];  // lane l has the elements l, l + 32, l + 64, ...
 };
@@ -197,8 +197,9 @@ class CrowdedSearcher {
     return {{lowest(0), highest(0)}, {lowest(1), highest(1)}, {lowest(2), highest(2)}};
   }
 
-  /// Tests all spheres in a range of cells against the queries of the lanes with `is_in`. The
-  /// origin of local coordinates is the centre of the query of lane `first`.
+  /// Tests the spheres in a range of cells against the queries of the lanes with `is_in`: all, or
+  /// in ordered cells those with ids above the lowest query. The origin of local coordinates is the
+  /// centre of the query of lane `first`.
   __device__ void search(const SingleLevel& level, bool is_in, int first, const CellRange& near) {
     const Vec3 origin{__shfl_sync(kFullWarp, self_.centre.x, first),
                       __shfl_sync(kFullWarp, self_.centre.y, first),
@@ -379,8 +380,12 @@ class CrowdedSearcher {
     __syncwarp();
     constexpr unsigned kFew = 8, kMany = 16;  // neighbors of a lane
     const bool is_long_row = kept > kFew * kLanesOfQuery;
-    if (kMaxStaged <= kMany * kLanesOfQuery && __any_sync(kFullWarp, is_long_row)) {
-      sort_row<kMany>(row, kept);
+    if constexpr (kMaxStaged <= kMany * kLanesOfQuery) {
+      if (__any_sync(kFullWarp, is_long_row)) {
+        sort_row<kMany>(row, kept);
+      } else {
+        sort_row<kFew>(row, kept);
+      }
     } else {
       sort_row<kFew>(row, is_long_row ? 0 : kept);
       for (unsigned left = __ballot_sync(kFullWarp, is_long_row && part() == 0); left != 0;
@@ -440,7 +445,7 @@ class CrowdedSearcher {
       sort_bitonic(ids, length / 4);
     }
   }
-  /// Sorts bitonic sequences of 2 * kDistance values.
+  /// Sorts bitonic sequences of 2 * first_distance values.
   template <unsigned kOfLane>
   __device__ static void sort_bitonic(std::uint32_t (&ids)[kOfLane], unsigned first_distance) {
 #pragma unroll

@@ -58,11 +58,11 @@ __device__ inline DirectPlan make_direct_plan(const GridArgs& args) {
   const double cells = static_cast<double>(nx) * static_cast<double>(ny) * static_cast<double>(nz);
   const double cell_slots = static_cast<double>(args.input.n) * kDirectSlots / cells;
   if (cell_slots < kMinCellSlots) return plan;
-  // The first spheres have pairs with all of their neighbors, about 4.19 times the spheres of a
-  // cell. Cells at the boundary have fewer.
+  // The first spheres have pairs with all of their neighbors: about 4.19 times the spheres of a
+  // cell, or fewer in a thin layer. Cells at the boundary have fewer spheres.
   const double longest_rows = 4.19 * static_cast<double>(args.input.n) / cells *
                               static_cast<double>(args.input.rows()) / gridDim.x;
-  if (longest_rows > 0.75 * kDirectPairs) return plan;
+  if (longest_rows > kDirectFill * kDirectPairs) return plan;
   plan.nx = static_cast<std::int32_t>(nx);
   plan.ny = static_cast<std::int32_t>(ny);
   plan.nz = static_cast<std::int32_t>(nz);

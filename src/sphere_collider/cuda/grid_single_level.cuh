@@ -230,7 +230,7 @@ class SingleLevelSearcher {
       if (k < kept_) held(ranks[k]) = positions[k];
     }
     for (unsigned k = kRanked; k < kept_; ++k) {
-      const std::uint32_t position = held(k), id = args_.table.ids[position];
+      const std::uint32_t position = held(k), id = id_at(position);
       unsigned to = k;
       for (; to > 0 && id_at(held(to - 1)) > id; --to) {
         held(to) = held(to - 1);
@@ -267,7 +267,7 @@ class SingleLevelSearcher {
       const std::uint32_t a = __shfl_sync(kFullWarp, id_, owner);
       if (i < all) {
         const std::uint32_t position = s_.held[32 * slot + owner];
-        const std::uint32_t b = args_.table.ids[position];
+        const std::uint32_t b = id_at(position);
         const SphereInstance self = load_sorted(args_.table.sorted + first_position + owner);
         write_or_stage(staging_, index + i, a, b, self, load_sorted(args_.table.sorted + position),
                        s_.staged);

@@ -157,7 +157,7 @@ struct SortCapacity {
 struct SortStorage {
   std::uint32_t* counts;    // spheres of each bucket, then the position of its next sphere
   SphereInstance* spheres;  // spheres of the coarse bucket
-  std::uint32_t* ids;       // their indices
+  std::uint32_t* ids;       // their ids
   std::uint16_t* order;     // their order by bucket, as indices of `spheres`
 };
 __device__ inline SortStorage sort_storage(unsigned char* memory, const SortCapacity& capacity) {

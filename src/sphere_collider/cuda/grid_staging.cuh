@@ -27,7 +27,7 @@ __device__ inline StagedList staged_list(unsigned long long index, unsigned coun
   return {index << StagedList::kCountBits | count};
 }
 
-/// The staging buffer as an output: of contacts, or of the neighbors b alone.
+/// The staging buffer as an output: of contacts, or of the ids of the neighbors b.
 __device__ inline SearchOutput staging_output(const GridArgs& args, const SearchOutput& output) {
   SearchOutput staging{};
   if (output.contacts != nullptr) {
@@ -116,8 +116,8 @@ __device__ bool writes_shifts(const GridArgs& args, const SearchOutput& output) 
 /// @param to index of the pair of this lane in the output
 /// @param codes the shift code of its image, and above it that of its sphere
 /// @param count of the lanes that have a pair
-__device__ inline void write_shifts(std::int32_t* shifts, unsigned long long to,
-                                    std::uint32_t codes, std::uint32_t count) {
+__device__ inline void write_pair_shifts(std::int32_t* shifts, unsigned long long to,
+                                         std::uint32_t codes, std::uint32_t count) {
   const unsigned long long first = __shfl_sync(kFullWarp, to, 0);
   // There is a gap between pairs of rows that precede and follow a long row.
   const bool has_gap = __any_sync(kFullWarp, lane_id() < count && to != first + lane_id());
@@ -133,8 +133,8 @@ __device__ inline void write_shifts(std::int32_t* shifts, unsigned long long to,
   }
 }
 
-/// The same for pairs, of whose second spheres or images the ids are staged. The first row of the
-/// bin is first_a.
+/// copy_contacts() for pairs, of whose second spheres or images the ids are staged. The first row
+/// of the bin is first_a.
 template <bool kPeriodic>
 __device__ void copy_pairs(const GridArgs& args, const std::uint32_t* staging,
                            const SearchOutput& output, std::uint32_t first_a, std::uint32_t first,
@@ -162,7 +162,7 @@ __device__ void copy_pairs(const GridArgs& args, const std::uint32_t* staging,
         if (has_shifts && of_warp < past) {
           const std::uint32_t codes =
               shift_code_of(ids[k]) | std::uint32_t{s.shift_codes[owners[k]]} << kShiftBits;
-          write_shifts(output.rows.shifts, to, codes, past - of_warp);
+          write_pair_shifts(output.rows.shifts, to, codes, past - of_warp);
         }
       }
     }

@@ -65,7 +65,7 @@ __global__ void __launch_bounds__(kListThreads)
   __shared__ BlockSums::TempStorage sums;
   __shared__ unsigned long long images_before;
   const Real reach = 2 * detail::reduced_radius(largest_radius, args.errors);
-  bool has_bad = false, has_far = false;
+  bool has_bad = false, has_no_code = false;
   for (std::size_t first = kOfThread * (first_element() - threadIdx.x); first < args.n;
        first += kOfThread * element_stride()) {
     const auto index = [&](unsigned k) { return first + k * kListThreads + threadIdx.x; };
@@ -87,7 +87,7 @@ __global__ void __launch_bounds__(kListThreads)
         sphere = detail::reduced(sphere, args.cell, args.errors, &cells[k]);
         point.cells = packed(cells[k]);
         codes[k] = detail::near_images(sphere.centre, args.cell, reach);
-        if (!has_shift_code(cells[k])) has_far = true;
+        if (!has_shift_code(cells[k])) has_no_code = true;
       } else {
         has_bad = true;
       }
@@ -112,7 +112,7 @@ __global__ void __launch_bounds__(kListThreads)
     }
   }
   if (__any_sync(kFullWarp, has_bad) && lane_id() == 0) state.has_bad = 1;
-  if (__any_sync(kFullWarp, has_far) && lane_id() == 0) state.has_far = 1;
+  if (__any_sync(kFullWarp, has_no_code) && lane_id() == 0) state.has_no_code = 1;
   if (!is_last_block(state.blocks_passed) || threadIdx.x != 0) return;
   const unsigned long long images = __ldcg(&state.images);
   const bool valid = __ldcg(&state.has_bad) == 0, complete = images <= args.capacity;
@@ -127,7 +127,7 @@ __global__ void __launch_bounds__(kListThreads)
       .cell = args.cell,
       .n = ready ? args.n + static_cast<std::uint32_t>(images) : 0,
       .may_touch_twice = may_touch_twice,
-      .has_shift_codes = args.index_bit > 1 && __ldcg(&state.has_far) == 0 && !may_touch_twice,
+      .has_shift_codes = args.index_bit > 1 && __ldcg(&state.has_no_code) == 0 && !may_touch_twice,
       .shifts_are_written = false};
   state = {};
   write_signal(args.signal, images, valid, complete);

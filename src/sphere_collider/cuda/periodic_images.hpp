@@ -9,8 +9,6 @@
 
 #include <cuda_runtime_api.h>
 
-#include <type_traits>
-
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cuda {
@@ -21,7 +19,7 @@ struct PeriodicState {
   unsigned long long largest_radius;  ///< bits of the largest radius of the given spheres
   unsigned long long images;          ///< number of images, including those beyond the capacity
   std::uint32_t has_bad;        ///< 1: a sphere is invalid, too large for its cell or too far away
-  std::uint32_t has_far;        ///< 1: a sphere is too far from the cell for a shift code
+  std::uint32_t has_no_code;    ///< 1: a sphere is too far from the cell for a shift code
   std::uint32_t blocks_passed;  ///< blocks that have appended their images
 };
 

@@ -1,4 +1,4 @@
-/// Searches in a periodic cell: ids of images, and the exact test of candidates.
+/// Searches in a periodic cell: ids with shift codes, shifts, and the exact test of candidates.
 #pragma once
 
 #include "src/sphere_collider/cuda/search.cuh"

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -37,7 +38,7 @@ struct alignas(16) SearchState {
   std::uint32_t long_rows;           ///< entries of GridArgs::Rows::long_rows
   std::uint32_t very_long_rows;      ///< entries of GridArgs::Rows::very_long_rows
   std::uint32_t rows_again;          ///< entries of Table::ranks: see list_row_again()
-  std::uint32_t groups_taken;        ///< of crowded spheres, after the first of each warp
+  std::uint32_t groups_taken;        ///< of spheres in ordered cells, after the first of each warp
   std::uint32_t has_far;             ///< 1: there are spheres far from the origin (grid_cells.hpp)
   std::uint32_t blocks_sampled;      ///< blocks that have finished their part of the sample
   std::uint32_t blocks_counted;      ///< blocks that have counted coarse buckets
@@ -122,7 +123,7 @@ struct SearchOutput {
   /// can poll it, before all contacts are written.
   unsigned long long* signal = nullptr;
   IndexRows rows = {};
-  std::uint32_t* neighbors = nullptr;  ///< the b's of the pairs alone
+  std::uint32_t* neighbors = nullptr;  ///< the ids of the b's of the pairs alone
 };
 
 /// A ContactCount, without the index of an invalid sphere, in one word.

@@ -51,6 +51,9 @@ inline constexpr unsigned kCoarseBuckets = 2048;
 /// Intended mean number of spheres of a coarse bucket, and smallest limit of the number of coarse
 /// buckets. Fewer buckets need fewer atomics; more buckets are sorted by more blocks.
 inline constexpr std::uint32_t kSpheresOfCoarse = 1024, kFewestCoarse = 256;
+/// Expected number of pairs of the first rows from which the search without sorting is not tried,
+/// divided by the largest number of pairs of a block.
+inline constexpr double kDirectFill = 0.75;
 /// Number of spheres from which the levels of the grid are chosen.
 inline constexpr std::uint32_t kSamples = 4096;
 /// Number of spheres per cell from which a warp searches for several spheres together.
@@ -63,8 +66,8 @@ inline constexpr std::uint32_t kSlots = 16;
 inline constexpr std::uint32_t kMaxStaged = 128;
 /// Longest row that one warp sorts. Longer rows are sorted by many blocks.
 inline constexpr std::uint32_t kMaxLongRow = 1024;
-/// The single-level search counts contacts in bins of this number of consecutive rows. One block
-/// copies a bin to the output.
+/// The single-level search counts contacts in bins of this number of consecutive rows. A block
+/// copies a bin, or a part of it, to the output.
 inline constexpr std::uint32_t kBin = 256;
 /// Number of copies of a block in a search in one launch, if bins can be divided into enough parts,
 /// and largest number of parts of a bin.
@@ -85,6 +88,7 @@ inline constexpr unsigned kCopyBlocks = 4;
 #else
 inline constexpr unsigned kSortBlocks = sizeof(Real) == 4 ? 3 : 2;
 inline constexpr unsigned kSearchBlocks = sizeof(Real) == 4 ? 5 : 3;
+/// The writes of more blocks reach the memory in a worse order.
 template <bool kPeriodic>
 inline constexpr unsigned kCopyBlocks = kPeriodic ? 4 : 5;
 #endif

@@ -137,7 +137,7 @@ TEST(CudaFilter, ExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
   EXPECT_GT(decisions.excluded, 1'000) << "a filter that excludes nothing would pass";
 }
 
-TEST(CudaFilter, LocalExcessKeepsTouchingPairsAndIsCertainOnlyOfThem) {
+TEST(CudaFilter, LocalDepthKeepsTouchingPairsAndIsCertainOnlyOfThem) {
   Random random(base_seed());
   Decisions decisions;
   const auto point = [&](Real size) {

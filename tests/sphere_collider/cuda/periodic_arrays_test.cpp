@@ -309,6 +309,21 @@ TEST_F(Cuda, PairsNearAPeriodicCellAreWrittenToArraysOfTheCaller) {
   }
 }
 
+/// A search in several launches whose rows are short, long and very long.
+TEST_F(Cuda, PairsOfClumpsInAPeriodicCellAreWrittenToArraysOfTheCaller) {
+  Random random(base_seed());
+  ArrayCollider collider;
+  const auto cpu = make_sphere_collider({.backend = Backend::cpu});
+  const PeriodicCell cell{{8, 9, Real(7.5)}};
+  Spheres spheres = gas_near(cell, 300'000, Real(0.056), random);
+  for (const std::size_t n : {std::size_t{500}, std::size_t{1500}}) {
+    const SphereInstance place = spheres[random.below(spheres.size())];
+    for (std::size_t i = 0; i < n; ++i) spheres[random.below(spheres.size())] = place;
+  }
+  expect_pairs_in_arrays<std::int32_t>(collider, spheres, cell,
+                                       find_periodic_contacts(*cpu, spheres, cell));
+}
+
 TEST_F(Cuda, FewArraysOfTwoSetsInAPeriodicCellHaveTheContactsOfTheHost) {
   Random random(base_seed());
   const OwnedStream stream(0);
