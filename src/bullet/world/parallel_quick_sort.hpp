@@ -78,20 +78,20 @@ class ParallelQuickSort {
   /// must move, and exchanges the k-th of one list with the k-th of the other, as the steps of the
   /// partition do. Ends before the blocks would overlap.
   void exchange_blocks(T* items, const T& pivot, std::ptrdiff_t* i, std::ptrdiff_t* j) const {
-    constexpr std::ptrdiff_t kBlock = 32;
-    std::array<std::uint8_t, kBlock> of_left, of_right;
+    constexpr std::ptrdiff_t kItemsOfBlock = 32;
+    std::array<std::uint8_t, kItemsOfBlock> of_left, of_right;
     std::size_t left = 0, left_count = 0, right = 0, right_count = 0;  // next, and past the last
-    while (*j - *i + 1 >= 2 * kBlock) {
+    while (*j - *i + 1 >= 2 * kItemsOfBlock) {
       if (left == left_count) {
         left = left_count = 0;
-        for (std::ptrdiff_t k = 0; k < kBlock; ++k) {
+        for (std::ptrdiff_t k = 0; k < kItemsOfBlock; ++k) {
           of_left[left_count] = static_cast<std::uint8_t>(k);
           left_count += less_(items[*i + k], pivot) ? 0 : 1;
         }
       }
       if (right == right_count) {
         right = right_count = 0;
-        for (std::ptrdiff_t k = 0; k < kBlock; ++k) {
+        for (std::ptrdiff_t k = 0; k < kItemsOfBlock; ++k) {
           of_right[right_count] = static_cast<std::uint8_t>(k);
           right_count += less_(pivot, items[*j - k]) ? 0 : 1;
         }
@@ -99,8 +99,8 @@ class ParallelQuickSort {
       for (; left < left_count && right < right_count; ++left, ++right) {
         std::swap(items[*i + of_left[left]], items[*j - of_right[right]]);
       }
-      if (left == left_count) *i += kBlock;
-      if (right == right_count) *j -= kBlock;
+      if (left == left_count) *i += kItemsOfBlock;
+      if (right == right_count) *j -= kItemsOfBlock;
     }
     if (left < left_count) *i += of_left[left];
     if (right < right_count) *j -= of_right[right];
