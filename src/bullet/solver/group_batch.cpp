@@ -7,9 +7,7 @@
 #include "src/bullet/solver/constraint_solver_impl.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <bit>
 #include <chrono>
 #include <new>
 

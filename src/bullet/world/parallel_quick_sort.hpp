@@ -79,22 +79,27 @@ class ParallelQuickSort {
   /// partition do. Ends before the blocks would overlap.
   void exchange_blocks(T* items, const T& pivot, std::ptrdiff_t* i, std::ptrdiff_t* j) const {
     constexpr std::ptrdiff_t kItemsOfBlock = 32;
-    std::array<std::uint8_t, kItemsOfBlock> of_left, of_right;
+    using Offsets = std::array<std::uint8_t, kItemsOfBlock>;
+    // Returns the number of offsets in a block for which must_move(offset) is true.
+    const auto list = [](Offsets* offsets, const auto& must_move) {
+      std::size_t count = 0;
+      for (std::ptrdiff_t k = 0; k < kItemsOfBlock; ++k) {
+        (*offsets)[count] = static_cast<std::uint8_t>(k);
+        count += must_move(k) ? 1 : 0;
+      }
+      return count;
+    };
+    Offsets of_left, of_right;
     std::size_t left = 0, left_count = 0, right = 0, right_count = 0;  // next, and past the last
     while (*j - *i + 1 >= 2 * kItemsOfBlock) {
       if (left == left_count) {
-        left = left_count = 0;
-        for (std::ptrdiff_t k = 0; k < kItemsOfBlock; ++k) {
-          of_left[left_count] = static_cast<std::uint8_t>(k);
-          left_count += less_(items[*i + k], pivot) ? 0 : 1;
-        }
+        left = 0;
+        left_count = list(&of_left, [&](std::ptrdiff_t k) { return !less_(items[*i + k], pivot); });
       }
       if (right == right_count) {
-        right = right_count = 0;
-        for (std::ptrdiff_t k = 0; k < kItemsOfBlock; ++k) {
-          of_right[right_count] = static_cast<std::uint8_t>(k);
-          right_count += less_(pivot, items[*j - k]) ? 0 : 1;
-        }
+        right = 0;
+        right_count =
+            list(&of_right, [&](std::ptrdiff_t k) { return !less_(pivot, items[*j - k]); });
       }
       for (; left < left_count && right < right_count; ++left, ++right) {
         std::swap(items[*i + of_left[left]], items[*j - of_right[right]]);

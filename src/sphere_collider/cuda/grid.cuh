@@ -144,7 +144,7 @@ __device__ inline void make_plan(const GridArgs& args, GridPlan& plan) {
     const bool may_be_crowded =
         scale.last_level == 0 && state.has_far == 0 && (equal_radii || !args.input.is_periodic()) &&
         scale.half_0 >= kLeastLocalHalf && scale.half_0 <= kLargestLocalHalf;
-    Real per_cube = 0;  // spheres per cube of the cell width
+    Real per_cube = 0;  // spheres per cube of the cell width: the larger estimate
     const Vec3 high{from_ordered(state.farthest[0]), from_ordered(state.farthest[2]),
                     from_ordered(state.farthest[4])};
     const Vec3 low{-from_ordered(state.farthest[1]), -from_ordered(state.farthest[3]),

@@ -379,16 +379,16 @@ class CrowdedSearcher {
     }
     __syncwarp();
     constexpr unsigned kFew = 8, kMany = 16;  // neighbors of a lane
-    const bool is_long_row = kept > kFew * kLanesOfQuery;
+    const bool needs_many = kept > kFew * kLanesOfQuery;
     if constexpr (kMaxStaged <= kMany * kLanesOfQuery) {
-      if (__any_sync(kFullWarp, is_long_row)) {
+      if (__any_sync(kFullWarp, needs_many)) {
         sort_row<kMany>(row, kept);
       } else {
         sort_row<kFew>(row, kept);
       }
     } else {
-      sort_row<kFew>(row, is_long_row ? 0 : kept);
-      for (unsigned left = __ballot_sync(kFullWarp, is_long_row && part() == 0); left != 0;
+      sort_row<kFew>(row, needs_many ? 0 : kept);
+      for (unsigned left = __ballot_sync(kFullWarp, needs_many && part() == 0); left != 0;
            left &= left - 1) {
         const int first = __ffs(static_cast<int>(left)) - 1;
         sort_row_of_warp(s_.rows + __shfl_sync(kFullWarp, start, first),

@@ -143,6 +143,7 @@ __device__ ImageShift shift_of_pair(const SpheresInCells& in, std::uint32_t a, s
   return detail::shift_of_touching(load_sphere(in.spheres + a), load_sphere(in.spheres + b),
                                    cell_of_sphere(in, a));
 }
+
 __global__ void __launch_bounds__(kListThreads)
     make_contacts(const __grid_constant__ SpheresInCells in, const SpherePair* pairs, std::size_t n,
                   SphereContact* contacts) {

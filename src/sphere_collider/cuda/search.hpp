@@ -106,8 +106,8 @@ struct IndexRows {
   void* indices = nullptr;  ///< std::int32_t, or std::int64_t if `is_wide`
   bool is_wide = false;
   unsigned long long length = 0;  ///< of a row: the number of pairs, which the kernels set
-  /// Of a search in a periodic cell, or null: receives the shifts of the b's, unless
-  /// PeriodicSpheres::shifts_are_written is false after the search.
+  /// Of a search in a periodic cell, or null: receives the shifts of the b's, if the search sets
+  /// PeriodicSpheres::shifts_are_written.
   std::int32_t* shifts = nullptr;
   const CellPoint* points = nullptr;  ///< if there are shifts: of the spheres
 };

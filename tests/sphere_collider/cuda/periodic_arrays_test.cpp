@@ -264,7 +264,7 @@ TEST_F(Cuda, PairsInAPeriodicCellAreWrittenToArraysOfTheCaller) {
   }
 }
 
-/// `n` spheres in the cell or half a length above it.
+/// `n` spheres in the cell or, along some axes, in the next one.
 Spheres gas_near(const PeriodicCell& cell, std::size_t n, Real radius, Random& random) {
   Spheres spheres(n);
   for (SphereInstance& s : spheres) {
