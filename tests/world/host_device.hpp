@@ -6,6 +6,7 @@
 
 #include "src/base/atomic.hpp"
 #include "src/world/device/device_step.hpp"
+#include "src/world/device/warp_items.hpp"
 
 #include <algorithm>
 #include <barrier>
@@ -46,6 +47,8 @@ class HostTeam {
   void sync() const {
     if (shared_ != nullptr) shared_->barrier.arrive_and_wait();
   }
+  /// Differs between runs of programs, so that rows and bodies are distributed differently.
+  std::uint32_t warps() const { return 1u << random_bits() % 12; }
   const device::RowBins& cached_bins(const device::RowBins* bins) const { return bins[part_]; }
   std::uint32_t part() const { return part_; }
   HostTeam team_of_part() const {
@@ -96,6 +99,10 @@ class HostTeam {
       f(0u, 1u, [] {});
     }
   };
+  Threads threads() const {
+    memory_.clear();
+    return {*this, &memory_};
+  }
   void sort(std::uint32_t n, const device::SortedCodes& codes) const {
     once([&] {
       std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted(n);
@@ -119,6 +126,11 @@ class HostTeam {
     for_each_nowait(n, f, division);
     sync();
   }
+  template <class F>
+  void for_each_divergent(std::uint32_t n, const F& f,
+                          const device::Division* division = nullptr) const {
+    for_each_nowait(n, f, division);
+  }
   /// With one thread.
   template <class F>
   void for_each_thread(const F& f) const {
@@ -132,9 +144,11 @@ class HostTeam {
   void in_one_block(const F& f) const {
     once([&] { f(HostTeam(nullptr, 0, 1, ++loops_)); });
   }
-  /// Completes the items in a different order than that of their dependencies.
+  /// Completes the items in a different order than that of their dependencies, or, in some runs,
+  /// warp by warp, as a device with a single warp.
   template <class Dataflow>
   void run_dataflow(std::uint32_t n, const Dataflow& dataflow) const {
+    if (random_bits() >= 1u << 15) return run_warps(n, dataflow);
     std::vector<typename Dataflow::Item> items(n);
     for (std::uint32_t i = 0; i < n; ++i) dataflow.begin(i, &items[i]);
     while (!items.empty()) {
@@ -232,6 +246,23 @@ class HostTeam {
   }
 
  private:
+  /// 16 bits that are constant in a run of a program.
+  std::uint32_t random_bits() const {
+    return static_cast<std::uint32_t>(loops_ >> 32) * 2654435761u >> 16;
+  }
+  template <class Dataflow>
+  static void run_warps(std::uint32_t n, const Dataflow& dataflow) {
+    constexpr std::uint32_t kLanes = device::WarpItems::kLanes;
+    for (std::uint32_t first = 0; first < n; first += kLanes) {
+      std::vector<typename Dataflow::Item> items(std::min(kLanes, n - first));
+      for (std::uint32_t i = 0; i < items.size(); ++i) dataflow.begin(first + i, &items[i]);
+      for (auto& item : items) {
+        if (!dataflow.is_ready(&item)) throw std::logic_error("a warp waits for a later one");
+      }
+      for (std::size_t i = items.size(); i-- > 0;) dataflow.complete(&items[i]);
+    }
+  }
+
   template <class F>
   void visit(const device::Range& range, const F& f) const {
     const std::uint32_t n = range.end - range.begin;

@@ -6,7 +6,8 @@ jfpx_add_test(world_parts_test THESIS INTERNAL SOURCES
   world/gyroscopic_test.cpp
   world/neighbor_list_test.cpp
   world/query_tree_test.cpp
-  world/swept_bounds_test.cpp)
+  world/swept_bounds_test.cpp
+  world/warp_items_test.cpp)
 jfpx_add_test(ranks_test INTERNAL SOURCES world/ranks_test.cpp)
 jfpx_add_test(device_world_test THESIS INTERNAL SOURCES world/device_world_test.cpp)
 if(JFPX_HAS_CUDA)

@@ -110,6 +110,9 @@ class GridTeam {
     return team;
   }
 
+  /// Number of warps of the team.
+  JFPX_HD std::uint32_t warps() const { return blocks_ * kWarps; }
+
   /// Copies the bins of the part of this thread to shared memory. At most one copy exists at a
   /// time.
   /// @param bins by part
@@ -177,6 +180,9 @@ class GridTeam {
     }
   };
 
+  /// The threads of the block of this thread.
+  JFPX_HD Threads threads() const { return {}; }
+
   /// Calls f(block, threads) for all blocks < n of a partition of work, in ascending order, each
   /// with the threads of one block of the launch. All calls with the same n assign a block to the
   /// same threads. The threads of a block wait for each other, but not for other blocks.
@@ -203,6 +209,21 @@ class GridTeam {
     const device::Range mine = range_of_part(n, division);
     const std::uint32_t threads = blocks_of_part_ * kThreads;
     for (std::uint32_t i = mine.begin + thread_in_part(); i < mine.end; i += threads) f(i);
+#endif
+  }
+  /// for_each_nowait() for items that take different branches, which a warp executes one after the
+  /// other: if there are fewer items than threads, each warp has as few of them as possible.
+  template <class F>
+  JFPX_HD void for_each_divergent(std::uint32_t n, const F& f,
+                                  const device::Division* division = nullptr) const {
+#if defined(__CUDA_ARCH__)
+    const device::Range mine = range_of_part(n, division);
+    const std::uint32_t count = mine.end - mine.begin;
+    const std::uint32_t warps = blocks_of_part_ * kWarps, most = (count + warps - 1) / warps;
+    const std::uint32_t lanes = most < kLanes ? most : kLanes;
+    if (lane_id() >= lanes) return;
+    const std::uint32_t start = thread_in_part() / kLanes * lanes + lane_id();
+    for (std::uint32_t i = start; i < count; i += warps * lanes) f(mine.begin + i);
 #endif
   }
   /// Calls f(i) for all i < n, in any order, then waits for all threads.
@@ -250,7 +271,6 @@ class GridTeam {
                                                    const Dataflow& dataflow) const {
 #if defined(__CUDA_ARCH__)
     // Consecutive warps are in different blocks, so that a few items use several multiprocessors.
-    constexpr std::uint32_t kLanes = 32;
     const std::uint32_t warp = threadIdx.x / kLanes * blocks_ + block_;
     const std::uint32_t start = warp * kLanes + lane_id();
     for (std::uint32_t i = start; i - lane_id() < n; i += blocks_ * kThreads) {
@@ -406,17 +426,18 @@ class GridTeam {
   }
 
  private:
-  static constexpr unsigned kDigits = 256;  ///< of the radix sort
+  static constexpr unsigned kDigits = 256;               ///< of the radix sort
+  static constexpr unsigned kLanes = 32;                 ///< of a warp
+  static constexpr unsigned kWarps = kThreads / kLanes;  ///< of a block
 
 #if defined(__CUDA_ARCH__)
   /// One pass of the radix sort. @returns false, without effect, if all keys share the digit
   __device__ bool sort_by_digit(std::uint32_t n, const device::SortedCodes& codes,
                                 unsigned shift) const {
     static_assert(kThreads == kDigits);
-    constexpr unsigned kWarps = kThreads / 32;
     __shared__ std::uint32_t next[kDigits];
     __shared__ std::uint32_t of_warp[kWarps][kDigits];
-    const unsigned digit_of_thread = threadIdx.x, warp = threadIdx.x / 32;
+    const unsigned digit_of_thread = threadIdx.x, warp = threadIdx.x / kLanes;
     const auto digit_of = [&](std::uint64_t key) {
       return static_cast<unsigned>(key >> shift) % kDigits;
     };
@@ -555,13 +576,13 @@ class GridTeam {
   /// Exclusive prefix sum of `value` in the block. @param sum receives the sum over all threads
   template <class Number>
   __device__ static Number block_scan(Number value, Number* sum) {
-    __shared__ Number warp_sums[kThreads / 32];
-    const unsigned warp = threadIdx.x / 32;
+    __shared__ Number warp_sums[kWarps];
+    const unsigned warp = threadIdx.x / kLanes;
     const Number inclusive = warp_inclusive_sum(value);
-    if (lane_id() == 31) warp_sums[warp] = inclusive;
+    if (lane_id() == kLanes - 1) warp_sums[warp] = inclusive;
     __syncthreads();
     Number before = 0, total = 0;
-    for (unsigned w = 0; w < kThreads / 32; ++w) {
+    for (unsigned w = 0; w < kWarps; ++w) {
       if (w == warp) before = total;
       total += warp_sums[w];
     }

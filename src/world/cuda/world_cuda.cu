@@ -280,11 +280,16 @@ class CudaDevice {
     const DeviceGuard guard(device_);
     const Launch& limits = limits_of<Program>();
     const std::size_t share = items / parts;
-    const std::size_t wanted = (share + GridTeam::kThreads - 1) / GridTeam::kThreads;
+    std::size_t wanted = (share + GridTeam::kThreads - 1) / GridTeam::kThreads;
+    if constexpr (requires { Program::kThreadsPerItem; }) {
+      wanted = std::max(wanted, std::min(wanted * Program::kThreadsPerItem,
+                                         static_cast<std::size_t>(multiprocessors_)));
+    }
     std::size_t most = parts == 1 ? limits.most_blocks : limits.most_blocks_of_part;
     if constexpr (requires { Program::kItemsPerThread; }) {
-      most = std::clamp(share / (GridTeam::kThreads * Program::kItemsPerThread),
-                        static_cast<std::size_t>(multiprocessors_), most);
+      if (share < most * GridTeam::kThreads * Program::kItemsPerThread) {
+        most = std::min(most, static_cast<std::size_t>(multiprocessors_));
+      }
     }
     auto blocks = static_cast<unsigned>(std::clamp<std::size_t>(wanted, 1, most));
     const bool has_clusters = limits.has_clusters && parts == 1;

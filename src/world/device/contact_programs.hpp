@@ -6,6 +6,10 @@
 #include "src/world/device/list.hpp"
 #include "src/world/device/start_step.hpp"
 #include "src/world/device/step_data.hpp"
+#include "src/world/device/tuning.hpp"
+
+#include <cstddef>
+#include <cstdint>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -247,6 +251,7 @@ struct SphereProgram {
 /// Computes the contacts of all other sub-shapes.
 struct ShapeProgram {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kShape;
+  static constexpr std::size_t kThreadsPerItem = tuning::kThreadsPerItem;
   StepData data;
 
   template <class Team>
@@ -260,9 +265,12 @@ struct ShapeProgram {
       return;
     }
     const std::uint32_t begin = d.part * d.candidate_capacity();
-    team.team_of_part().for_each(d.state().candidates, [&](std::uint32_t i) { test(begin + i); });
-    team.for_each(
+    team.team_of_part().for_each_divergent(d.state().candidates,
+                                           [&](std::uint32_t i) { test(begin + i); });
+    team.sync();
+    team.for_each_divergent(
         d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); }, &d.divisions.slots);
+    team.sync();
     const auto size = [&](std::uint32_t body) { return d.manifold_sizes[body]; };
     const Range slots = range_of_part(d.step.bodies.capacity, d.part, d.parts, &d.divisions.slots);
     std::uint32_t* const bodies_with_manifolds = d.parent + slots.begin;  // not in use now
@@ -277,7 +285,7 @@ struct ShapeProgram {
     const std::uint64_t sizes =
         team.scan(d.step.bodies.capacity, size, size, place, &d.divisions.slots);
     // The bodies at a wall are close to each other, and so would be the work on them in the scan.
-    team.team_of_part().for_each_nowait(d.state().bodies_with_manifolds, [&](std::uint32_t i) {
+    team.team_of_part().for_each_divergent(d.state().bodies_with_manifolds, [&](std::uint32_t i) {
       const std::uint32_t body = bodies_with_manifolds[i];
       add_manifolds(body, d.manifold_sizes[body]);
     });

@@ -47,8 +47,8 @@ inline constexpr int kMarks = 4;
 ///   - `fetch(copies, pool)`: performs HostCopies, and waits;
 ///   - `find_pairs(spheres, n, pairs, capacity, count)`: see cuda::DeviceSphereCollider, after
 ///     `reserve_pairs(n, capacity)`;
-///   - `run(program, items, parts)`: runs program(team) with about one thread per item, on one
-///     device or on all, each with its StepData::part;
+///   - `run(program, items, parts)`: runs program(team) with about one thread per item, or as many
+///     as Program::kThreadsPerItem asks for, on one device or on all, each with its StepData::part;
 ///   - `wait()`: waits for all work; `wait_for_graphs()`: waits for all launched graphs;
 ///   - `fork(stream)`: later work of this object waits for earlier work of `stream`;
 ///     `join(stream)`: later work of `stream` waits for earlier work of this object;
@@ -330,13 +330,15 @@ class DeviceStep final : public DeviceWorld {
       return;
     }
     f(PrepareProgram<kPrepareOneBlock>{d}, contacts);
-    // More threads than rows: rows of manifolds need the caches of several multiprocessors.
-    const std::size_t rows =
-        std::max<std::size_t>(contacts, 4 * std::size_t{last_contacts().sizes().manifolds});
+    const auto solve = [&]<class Program>(const Program& program) {
+      const std::size_t others =
+          std::size_t{last_contacts().sizes().manifolds} + d.world_joints.count;
+      f(program, std::max(contacts, Program::kItemsPerOtherRow * others));
+    };
     if (has_joints) {
-      f(SolveProgram<soft_step::kRowKinds>{d}, rows);
+      solve(SolveProgram<soft_step::kRowKinds>{d});
     } else {
-      f(SolveProgram<soft_step::kContactRowKinds>{d}, rows);
+      solve(SolveProgram<soft_step::kContactRowKinds>{d});
     }
   }
 

@@ -4,6 +4,10 @@
 #include "src/base/atomic.hpp"
 #include "src/world/device/list.hpp"
 #include "src/world/device/step_data.hpp"
+#include "src/world/device/tuning.hpp"
+
+#include <cstddef>
+#include <cstdint>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -49,6 +53,7 @@ struct PrepareProgram {
                                                            ? tuning::kInnerStage
                                                        : kHasBlocks ? tuning::kPrepareStage
                                                                     : tuning::kPrepare;
+  static constexpr std::size_t kThreadsPerItem = tuning::kThreadsPerItem;
   static constexpr std::size_t kSharedBytes = has(kBuildInnerRows) ? sizeof(BlockRows)
                                               : has(kPlaceRows)    ? kBytesOfBins
                                                                    : 0;
@@ -114,7 +119,7 @@ struct PrepareProgram {
       team.for_each_nowait(bodies.count, [&](std::uint32_t i) { sort_fixed(bodies.ids[i].index); });
     }
     const RowBins& rows = d.bins[team.part()];
-    team.team_of_part().for_each_nowait(rows.begin[kBins] - rows.begin[0], [&](std::uint32_t i) {
+    team.team_of_part().for_each_divergent(rows.begin[kBins] - rows.begin[0], [&](std::uint32_t i) {
       fill_row(rows, rows.begin[0] + i);
     });
   }

@@ -6,6 +6,7 @@
 #include "src/world/device/impacts.hpp"
 #include "src/world/device/step_data.hpp"
 #include "src/world/device/sweep.hpp"
+#include "src/world/device/warp_items.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -36,7 +37,7 @@ struct RowSolver {
   /// A body of an item: the ticket for which the item waits, and the motion of the body at that
   /// ticket.
   struct ItemBody {
-    std::uint32_t index = 0;              ///< solver index
+    std::uint32_t index = kNone;          ///< solver index; kNone: the item has no body
     std::uint32_t before = 0, after = 0;  ///< tickets
     bool is_ready = false;
     SolverBody motion;
@@ -72,12 +73,13 @@ struct RowSolver {
   class RowDataflow {
    public:
     using Item = RowItem;
-    JFPX_HD RowDataflow(const RowSolver& solver, const Sweep& sweep, const Operation& operation)
-        : solver_(solver), sweep_(sweep), operation_(operation), cursor_(sweep) {}
+    JFPX_HD RowDataflow(const RowSolver& solver, const Sweep& sweep, const Operation& operation,
+                        const ColoredRows& rows)
+        : solver_(solver), sweep_(sweep), operation_(operation), rows_(rows) {}
 
     JFPX_HD void begin(std::uint32_t i, RowItem* item) const {
-      const std::uint32_t row = cursor_.find(i);
-      if (row != kNone) solver_.begin_colored_row(sweep_, row, cursor_.color(), item);
+      const auto [row, color] = rows_.find(i);
+      if (row != kNone) solver_.begin_colored_row(sweep_, row, color, item);
     }
     JFPX_HD bool is_ready(RowItem* item) const { return solver_.is_ready(item); }
     JFPX_HD void complete(RowItem* item) const { solver_.solve_row(sweep_, operation_, item); }
@@ -86,7 +88,7 @@ struct RowSolver {
     const RowSolver& solver_;
     const Sweep& sweep_;
     const Operation& operation_;
-    mutable RowCursor cursor_;
+    const ColoredRows& rows_;
   };
 
   /// Solves the overflow rows one after the other: by kind, then in the order of their contacts.

@@ -2,7 +2,9 @@
 #pragma once
 
 #include "src/world/device/row_solver.hpp"
+#include "src/world/device/warp_items.hpp"
 
+#include <cstddef>
 #include <cstdint>
 
 namespace jfpx {
@@ -16,16 +18,21 @@ namespace device {
 /// Team::run_dataflow() assigns a row to the same thread in all sweeps, and all other arrays by
 /// body are constant or written only by the thread of the body.
 ///
-/// There is no deadlock. The items of a thread have the order of the sweeps, and an item waits only
-/// for earlier items in this order, so the first incomplete item is always ready.
+/// There is no deadlock. All blocks are resident, and the warps take their items in the order of
+/// the sweeps. The items of a warp do not wait for each other, and an item waits only for items of
+/// lower warps and earlier calls. So all items of the first incomplete warp are ready.
 /// @tparam kKinds number of kinds of rows that occur, which are the first ones: a program without
 ///   rows of joints needs fewer registers
 template <soft_step::RowKind kKinds>
 struct SolveProgram : RowSolver<kKinds, BodyCells> {
   static constexpr unsigned kBlocksPerMultiprocessor = tuning::kSolve;
-  /// Minimum number of items per thread for a second block per multiprocessor. Waiting threads poll
-  /// memory, so a second block pays only if rows rarely wait.
-  static constexpr std::size_t kItemsPerThread = 32;
+  /// Minimum number of items of the launch per thread for more than one block per multiprocessor.
+  /// Waiting threads poll memory, so a second block pays only if rows rarely wait.
+  static constexpr std::size_t kItemsPerThread = 8;
+  /// Number of items of the launch for each row of a manifold or joint: only one to four lanes of a
+  /// warp have such a row.
+  static constexpr std::size_t kItemsPerOtherRow = 32;
+  static constexpr std::size_t kSharedBytes = sizeof(ColoredRows);
   using RowSolver<kKinds, BodyCells>::data;
 
   /// The sequence is that of SoftStep::solve(). Sweep 0 is the warm start. Each substep has sweeps
@@ -38,35 +45,44 @@ struct SolveProgram : RowSolver<kKinds, BodyCells> {
     const StepData& d = data;
     const bool rebounds = d.counters->any_rebound != 0;
     const SweepList sweeps{d.substeps, rebounds, d.joint_sweeps()};
-    Sweep sweep(team.cached_bins(d.bins), sweeps);
-    run(team, sweep, soft_step::WarmStart{});
+    const RowBins& bins = team.cached_bins(d.bins);
+    const Items items{start_rows(team, bins),
+                      {d.step.bodies.count, team.warps(), 0, WarpItems::kLog2OfLanes}};
+    Sweep sweep(bins, sweeps);
+    run(team, items, sweep, soft_step::WarmStart{});
     for (std::uint32_t substep = 0; substep < d.substeps; ++substep) {
       const bool is_last = substep + 1 == d.substeps;
       if constexpr (kKinds > soft_step::kContactRowKinds) {
         for (std::uint32_t k = 0; k < sweeps.joint_sweeps; ++k) {
           sweep.start(BodyStage::none);
-          run(team, sweep, soft_step::SolveJoints{{d.constants, k == 0}});
+          run(team, items, sweep, soft_step::SolveJoints{{d.constants, k == 0}});
         }
       }
       sweep.start(BodyStage::move);
-      run(team, sweep, soft_step::Solve<true>{d.constants});
+      run(team, items, sweep, soft_step::Solve<true>{d.constants});
       for (std::uint32_t k = 1; k <= soft_step::kRelaxSweeps; ++k) {
         const bool ends_substep = k == soft_step::kRelaxSweeps;
         sweep.start(!ends_substep ? BodyStage::none
                     : !is_last    ? BodyStage::accelerate
                     : rebounds    ? BodyStage::none
                                   : BodyStage::finish);
-        run(team, sweep, soft_step::Solve<false>{d.constants});
+        run(team, items, sweep, soft_step::Solve<false>{d.constants});
       }
     }
     if (!rebounds) return;
     sweep.start(BodyStage::finish);
-    run(team, sweep, soft_step::Restitute{});
+    run(team, items, sweep, soft_step::Restitute{});
   }
 
  private:
   using Base = RowSolver<kKinds, BodyCells>;
   using typename Base::BodyFree, typename Base::ItemBody, typename Base::SolverBody;
+
+  /// The items of the dataflows of a sweep.
+  struct Items {
+    const ColoredRows& rows;
+    WarpItems bodies;
+  };
 
   struct BodyItem : ItemBody {
     bool is_active = false;             ///< whether the body is movable and awake
@@ -79,11 +95,13 @@ struct SolveProgram : RowSolver<kKinds, BodyCells> {
    public:
     using Item = BodyItem;
     JFPX_HD BodyDataflow(const SolveProgram& program, const Sweep& sweep,
-                         const Operation& operation)
-        : program_(program), sweep_(sweep), operation_(operation) {}
+                         const Operation& operation, const WarpItems& items)
+        : program_(program), sweep_(sweep), operation_(operation), items_(items) {}
 
     JFPX_HD void begin(std::uint32_t i, BodyItem* item) const {
-      program_.begin_body(sweep_, program_.data.step.bodies.ids[i].index, item);
+      const BodyView& bodies = program_.data.step.bodies;
+      const std::uint32_t number = items_.find(i, bodies.count);
+      if (number != kNone) program_.begin_body(sweep_, bodies.ids[number].index, item);
     }
     JFPX_HD bool is_ready(BodyItem* item) const {
       if (item->is_active && !item->is_ready) item->template read<true>(program_.data);
@@ -97,19 +115,29 @@ struct SolveProgram : RowSolver<kKinds, BodyCells> {
     const SolveProgram& program_;
     const Sweep& sweep_;
     const Operation& operation_;
+    const WarpItems& items_;
   };
 
+  template <class Team>
+  JFPX_HD static const ColoredRows& start_rows(const Team& team, const RowBins& bins) {
+    const auto threads = team.threads();
+    auto* const rows = static_cast<ColoredRows*>(threads.shared(kSharedBytes));
+    rows->start(threads, bins, team.warps());
+    return *rows;
+  }
+
   template <class Team, class Operation>
-  [[gnu::always_inline]] JFPX_HD void run(const Team& team, const Sweep& sweep,
+  [[gnu::always_inline]] JFPX_HD void run(const Team& team, const Items& items, const Sweep& sweep,
                                           const Operation& operation) const {
     if (sweep.overflow() > 0) {
       team.sync();
       team.once([&] { this->run_overflow(sweep, operation, Tickets(sweep.number, 0).first); });
       team.sync();
     }
-    team.run_dataflow(sweep.colored_items,
-                      typename Base::template RowDataflow<Operation>(*this, sweep, operation));
-    team.run_dataflow(data.step.bodies.count, BodyDataflow<Operation>(*this, sweep, operation));
+    using Rows = typename Base::template RowDataflow<Operation>;
+    team.run_dataflow(items.rows.items(), Rows(*this, sweep, operation, items.rows));
+    team.run_dataflow(items.bodies.items(data.step.bodies.count),
+                      BodyDataflow<Operation>(*this, sweep, operation, items.bodies));
   }
 
   JFPX_HD void begin_body(const Sweep& sweep, std::uint32_t body, BodyItem* item) const {
@@ -127,6 +155,7 @@ struct SolveProgram : RowSolver<kKinds, BodyCells> {
   JFPX_HD void complete_body(const Sweep& sweep, const Operation& operation, BodyItem* item) const {
     const StepData& d = data;
     const std::uint32_t i = item->index;
+    if (i == kNone) return;
     if (!item->is_active) {
       if (sweep.stage == BodyStage::finish) this->finish_kinematic(i);
       return;

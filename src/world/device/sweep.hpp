@@ -1,4 +1,4 @@
-/// The items of a sweep of SolveProgram over the rows of all bins.
+/// The sweeps of a soft step on a device.
 #pragma once
 
 #include "src/contact_solver/soft_step/row_kinds.hpp"
@@ -10,9 +10,6 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
-
-/// Rows per warp; all have the same bin.
-inline constexpr std::uint32_t kWarpItems = 32;
 
 /// Work on a body between two sweeps.
 enum class BodyStage : std::uint8_t {
@@ -86,19 +83,11 @@ struct Sweep {
   const RowBins& bins;         ///< of a part
   const std::uint32_t* begin;  ///< RowBins::begin
   SweepList sweeps;
-  std::uint32_t colored_items = 0;  ///< number of items for all rows of colors
   std::uint32_t number = 0;
   BodyStage stage = BodyStage::none;  ///< after the rows; not used by BlockSolveProgram
 
   JFPX_HD Sweep(const RowBins& rows, const SweepList& all)
-      : bins(rows), begin(rows.begin), sweeps(all) {
-    for (std::uint32_t kind = 0; kind < soft_step::kRowKinds; ++kind) {
-      for (std::uint32_t group = soft_step::group_of_crossing(0); group < soft_step::kFixedGroup;
-           ++group) {
-        colored_items += items(soft_step::bin_of(kind, group));
-      }
-    }
-  }
+      : bins(rows), begin(rows.begin), sweeps(all) {}
   JFPX_HD SweepKind kind() const { return sweeps.kind(number); }
   JFPX_HD soft_step::RowKind kind_of(std::uint32_t row) const {
     return soft_step::kind_of_row(begin, row);
@@ -109,10 +98,6 @@ struct Sweep {
     return bins.first[soft_step::kKindOf<Row>];
   }
   JFPX_HD std::uint32_t size(std::uint32_t bin) const { return begin[bin + 1] - begin[bin]; }
-  /// Number of items for the rows of a bin. A warp has rows of one bin only, which are independent.
-  JFPX_HD std::uint32_t items(std::uint32_t bin) const {
-    return (size(bin) + kWarpItems - 1) / kWarpItems * kWarpItems;
-  }
   JFPX_HD std::uint32_t overflow() const { return overflow_rows(begin); }
   JFPX_HD void start(BodyStage next) {
     ++number;
@@ -120,40 +105,6 @@ struct Sweep {
   }
   /// See SweepList.
   JFPX_HD std::uint32_t moves() const { return sweeps.moves(number); }
-};
-
-/// Iterates over the crossing rows in sweep order: by color, then by kind.
-class RowCursor {
- public:
-  JFPX_HD explicit RowCursor(const Sweep& sweep) : sweep_(sweep) {}
-
-  /// Advances to an item; restarts the search if the item precedes that of the last call.
-  /// @returns the row, or kNone
-  JFPX_HD std::uint32_t find(std::uint32_t item) {
-    if (item < before_) {
-      before_ = 0;
-      group_ = soft_step::group_of_crossing(0);
-      kind_ = 0;
-    }
-    while (item - before_ >= sweep_.items(bin())) {
-      before_ += sweep_.items(bin());
-      if (++kind_ == soft_step::kRowKinds) {
-        kind_ = 0;
-        ++group_;
-      }
-    }
-    const std::uint32_t index = item - before_;
-    return index < sweep_.size(bin()) ? sweep_.begin[bin()] + index : kNone;
-  }
-
-  /// Number of the color in the class.
-  JFPX_HD std::uint32_t color() const { return group_ - soft_step::group_of_crossing(0); }
-
- private:
-  JFPX_HD std::uint32_t bin() const { return soft_step::bin_of(kind_, group_); }
-  const Sweep& sweep_;
-  std::uint32_t before_ = 0, group_ = soft_step::group_of_crossing(0);
-  std::uint32_t kind_ = 0;
 };
 
 }  // namespace device

@@ -4,6 +4,8 @@
 
 #include <jfpx/config.hpp>
 
+#include <cstddef>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace device {
@@ -14,6 +16,10 @@ inline constexpr unsigned kThreads = 256;  ///< of a block
 /// twice as many blocks are reduced to one cluster. More than 8 blocks are not portable, and Hopper
 /// supports 16.
 inline constexpr unsigned kClusterBlocks = 16;
+
+/// Threads launched for each item of a program whose items diverge, up to one block per
+/// multiprocessor: GridTeam::for_each_divergent() then gives each warp few items.
+inline constexpr std::size_t kThreadsPerItem = 8;
 
 // Resident blocks per multiprocessor for which the programs are compiled.
 inline constexpr unsigned kForce = 2, kBounds = 3, kSphere = 6, kShape = 3, kMatch = 6,
