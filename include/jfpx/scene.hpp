@@ -36,13 +36,15 @@ struct SoftStepSettings {
   /// Number of substeps per step, in [1, kMaxSubsteps]. More substeps make contacts stiffer.
   std::uint32_t substeps = 4;
   /// [Hz], >= 0, frequency of the contact springs between movable bodies; doubled against immovable
-  /// and kinematic bodies. Limited to a quarter of the substep rate, which 0 selects.
+  /// and kinematic bodies. Limited to a quarter of the substep rate, which 0 selects, and in
+  /// contacts of bodies with joints to an eighth, except between two movable spheres without
+  /// rolling friction.
   Real contact_hertz = 0;
   /// [-], in [0.01, 1000], of the contact springs. Between two movable spheres without rolling
   /// friction, multiplied by 6, or by 2 if they penetrate by more than 3 % of the smaller radius.
   Real damping_ratio = 1;
-  /// [m/s], > 0: maximum speed that removes a penetration. In contacts of bodies with joints that
-  /// are not between two spheres, a sixth of it.
+  /// [m/s], > 0: maximum speed that removes a penetration. In contacts of bodies with joints, a
+  /// sixth of it, except between two movable spheres without rolling friction.
   Real push_out_speed = 3;
   Real restitution_threshold = Real(0.25);  ///< [m/s], >= 0: slower contacts do not bounce
   /// [m], >= 0. Closer pairs have speculative contacts in the solver before they touch. For small

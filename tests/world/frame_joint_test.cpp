@@ -457,7 +457,7 @@ TEST(FrameJoint, StaysClosedWhileBarsThatItHoldsArePushedApart) {
     }
     World world(scene);
     double gap = 0;
-    for (int n = 0; n < 120; ++n) {
+    for (int n = 0; n < 240; ++n) {
       world.step();
       gap = std::max(gap, largest_gap(world));
     }

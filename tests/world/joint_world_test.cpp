@@ -200,6 +200,104 @@ TEST(JointWorld, JoinedBodiesSleepAndWakeTogether) {
   EXPECT_FALSE(world.awake(body(2)));
 }
 
+/// A body of a shape without damping.
+BodyDef solid(const Shape& shape, const Vec3& position, Real mass) {
+  BodyDef def;
+  def.shape = shape;
+  def.position = position;
+  def.mass = mass;
+  def.linear_damping = def.angular_damping = 1;
+  return def;
+}
+
+// The impulse of a contact with the foot moves the body above, too. At the frequency of other
+// contacts, the foot vibrated for ever.
+TEST(JointWorld, AHeavyBodyRestsOnALightFoot) {
+  for (const Shape& foot : {Shape(Box{{0.5_r, 0.5_r, 0.5_r}}), Shape(Sphere{0.5_r})}) {
+    for (const Real mass : {50.0_r, 200.0_r, 1000.0_r}) {
+      Scene scene;
+      scene.bodies = {solid(Box{{9, 1, 9}}, {0, -1, 0}, 0), solid(foot, {0, 0.5_r, 0}, 20),
+                      solid(Box{{1, 1, 1}}, {0, 2, 0}, mass)};
+      World world(scene);
+      const BodyId low = world.bodies()[1], high = world.bodies()[2];
+      FixedJoint joint{.a = high, .b = low};
+      place_joint(&joint, world.state(high), world.state(low), {0, 1, 0}, Vec3{0, 1, 0});
+      world.add_joint(joint);
+      step(&world, 1200);
+      EXPECT_FALSE(world.awake(high)) << mass << " kg on shape " << foot.index();
+      EXPECT_LT(length(world.state(high).position - Vec3{0, 2, 0}), 0.005_r) << mass;
+    }
+  }
+}
+
+TEST(JointWorld, AHeavyTableRestsOnLightLegs) {
+  Scene scene;
+  scene.bodies = {solid(Box{{9, 1, 9}}, {0, -1, 0}, 0)};
+  World world(scene);
+  const Vec3 start{0, 1.1_r, 0};
+  const BodyId slab = world.add(solid(Box{{1, 0.1_r, 1}}, start, 1000));
+  for (const Real x : {-0.8_r, 0.8_r}) {
+    for (const Real z : {-0.8_r, 0.8_r}) {
+      const BodyId leg = world.add(solid(Box{{0.2_r, 0.5_r, 0.2_r}}, {x, 0.5_r, z}, 20));
+      FixedJoint joint{.a = leg, .b = slab};
+      place_joint(&joint, world.state(leg), world.state(slab), {x, 1, z}, Vec3{0, 1, 0});
+      world.add_joint(joint);
+    }
+  }
+  step(&world, 1200);
+  EXPECT_FALSE(world.awake(slab));
+  EXPECT_LT(length(world.state(slab).position - start), 0.005_r);
+}
+
+TEST(JointWorld, AParkedCarFallsAsleep) {
+  for (const Shape& shape : {Shape(Cylinder{0.4_r, 0.15_r}), Shape(Sphere{0.4_r})}) {
+    for (const Real torque : {Real(0), 3000.0_r}) {
+      Scene scene;
+      scene.bodies = {solid(HalfSpace{}, {}, 0)};
+      World world(scene);
+      const BodyId chassis = world.add(solid(Box{{0.9_r, 0.3_r, 2}}, {0, 0.9_r, 0}, 1000));
+      for (const Real x : {-0.9_r, 0.9_r}) {
+        for (const Real z : {-1.4_r, 1.4_r}) {
+          const Vec3 hub{x, 0.4_r, z};
+          BodyDef def = solid(shape, hub, 20);
+          def.orientation = from_axis_angle({0, 0, 1}, kPi / 2);
+          def.friction = 1;
+          const BodyId wheel = world.add(def);
+          WheelJoint joint{.a = wheel, .b = chassis};
+          joint.hertz = 3;
+          joint.damping_ratio = 0.7_r;
+          joint.max_motor_torque = torque;
+          place_joint(&joint, world.state(wheel), world.state(chassis), hub,
+                      axes_along({1, 0, 0}, {0, 1, 0}));
+          world.add_joint(joint);
+        }
+      }
+      step(&world, 1200);
+      EXPECT_FALSE(world.awake(chassis)) << "shape " << shape.index() << ", " << torque << " N m";
+    }
+  }
+}
+
+// The ball of a pendulum has a ManifoldRow with the wall.
+TEST(JointWorld, AnElasticPendulumReboundsFromAWall) {
+  Scene scene;
+  scene.bodies = {solid(Sphere{0.5_r}, {-2, 0, 0}, 1), solid(Box{{1, 3, 3}}, {1.5_r, -2, 0}, 0)};
+  for (BodyDef& def : scene.bodies) def.restitution = 1, def.friction = 0;
+  World world(scene);
+  const BodyId ball = world.bodies()[0];
+  DistanceJoint rod = rod_of(ball, std::nullopt, 2);
+  world.add_joint(rod);
+  Real before = 0, after = 0;  // largest speeds
+  for (int n = 0; n < 120; ++n) {
+    world.step();
+    const Vec3 velocity = world.state(ball).velocity;
+    Real& largest = velocity.x > 0 && after == 0 ? before : after;
+    largest = std::max(largest, length(velocity));
+  }
+  EXPECT_NEAR(before, std::sqrt(2 * 9.81_r * 2), 0.1_r);
+  EXPECT_NEAR(after, before, 0.1_r);
+}
+
 TEST(JointWorld, AddingChangingAndRemovingAJointWakesItsBodies) {
   Scene scene;
   for (int i = 0; i < 2; ++i) {

@@ -62,8 +62,8 @@ struct alignas(4 * sizeof(Real)) ManifoldRow {
   Real slip_mass = 0;                   ///< [kg], the smallest effective mass of a tangent
   Real rolling_friction = 0, spinning_friction = 0;  ///< [m]
   Vec3 rolling_impulse;  ///< [N m s], torque impulse of rolling and spinning friction on a
-  /// Whether a movable body has joints. Such a contact does not project the bodies: it would pull
-  /// joints open, and tangled limbs would stay tangled.
+  /// Whether a movable body has joints. Such a contact is softer (see make_step_constants()), and
+  /// does not project the bodies: it would pull joints open, and tangled limbs would stay tangled.
   std::uint32_t is_jointed = 0;
 };
 
@@ -232,12 +232,19 @@ JFPX_HD inline void solve_friction(ManifoldRow* row, Real pressure, const BodyPa
   row->friction_x = x, row->friction_y = y, row->twist_impulse = twist;
 }
 
+template <bool kFixed>
+JFPX_HD constexpr const Softness& softness_of(const ManifoldRow& row, const StepConstants& step) {
+  if (row.is_jointed != 0) return kFixed ? step.jointed_fixed : step.jointed;
+  return kFixed ? step.fixed : step.movable;
+}
+
 /// Normal impulses of all points, one after the other.
 template <bool kFixed>
 JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, const BodyPair& pair,
                                   const StepConstants& step, bool use_bias) {
   const Vec3 n = row.normal;
   const std::uint32_t count = row.count;
+  const Softness softness = softness_of<kFixed>(row, step);
   PointRow next = points[0];
   for (std::uint32_t i = 0; i < count; ++i) {
     const PointRow p = next;
@@ -246,7 +253,7 @@ JFPX_HD inline void solve_normals(const ManifoldRow& row, PointRow* points, cons
                        (dot(p.turn_a, pair.a->rotation) - dot(p.turn_b, pair.b->rotation));
     const Real separation = p.distance + moved;
     if (is_idle(separation, p.normal_impulse, use_bias)) continue;
-    const Bias bias = bias_of(separation, kFixed ? step.fixed : step.movable, step, use_bias);
+    const Bias bias = bias_of(separation, softness, step, use_bias);
     const Real closing = speed_along(pair, n, p);
     const Real change = -(p.normal_mass * bias.mass_scale) * (closing + bias.velocity) -
                         bias.impulse_scale * p.normal_impulse;

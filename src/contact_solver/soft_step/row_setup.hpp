@@ -88,7 +88,7 @@ struct RowSetup {
   }
 
   /// Kind of the row of a contact, which may differ from the kind of the contact: two balls with
-  /// rolling friction have a ManifoldRow, and a ball on a fixed box has a SphereRow.
+  /// rolling friction have a ManifoldRow, and a ball without joints on a fixed box has a SphereRow.
   /// @returns kNoRow if no body is movable and awake, or if a movable body sleeps
   JFPX_HD RowKind kind_of(std::uint32_t contact) const {
     if (is_joint(contact)) return joint_kind(joint_of(contact));
@@ -101,6 +101,9 @@ struct RowSetup {
       return kKindOf<ManifoldRow>;
     }
     if (((a | b) & BodyTraits::kRolls) != 0) return kKindOf<ManifoldRow>;
+    // A SphereRow with a fixed body is as stiff for a body with joints as for any other.
+    const bool is_with_fixed = (a & b & BodyTraits::kMovable) == 0;
+    if (is_with_fixed && is_jointed(key.a, key.b)) return kKindOf<ManifoldRow>;
     return (a & b & BodyTraits::kIsRound) != 0 ? kKindOf<SphereRow> : kKindOf<ManifoldRow>;
   }
 
@@ -203,7 +206,7 @@ struct RowSetup {
     const Vec3 rolling =
         rolls && contacts.rolling_impulses != nullptr ? contacts.rolling_impulses[contact] : Vec3{};
     row->rolling_impulse = flipped ? -rolling : rolling;
-    row->is_jointed = joints.count > 0 && (is_joined(row->a) || is_joined(row->b)) ? 1 : 0;
+    row->is_jointed = is_jointed(row->a, row->b) ? 1 : 0;
     return restitution;
   }
   template <bool kFixed>
@@ -469,8 +472,12 @@ struct RowSetup {
   JFPX_HD bool is_movable(std::uint32_t body) const {
     return (properties.traits[body] & BodyTraits::kMovable) != 0;
   }
-  JFPX_HD bool is_joined(std::uint32_t body) const {
-    return is_movable(body) && properties.constrained[body] >= kHasJoint;
+  /// Whether one of the bodies of a contact is movable and has joints.
+  JFPX_HD bool is_jointed(std::uint32_t a, std::uint32_t b) const {
+    const auto is_joined = [this](std::uint32_t body) {
+      return is_movable(body) && properties.constrained[body] >= kHasJoint;
+    };
+    return joints.count > 0 && (is_joined(a) || is_joined(b));
   }
   JFPX_HD static bool sleeps(std::uint8_t traits) {
     return (traits & (BodyTraits::kMovable | BodyTraits::kActive)) == BodyTraits::kMovable;

@@ -49,6 +49,8 @@ struct StepConstants {
   Softness balls;       ///< between two movable spheres, in a SphereRow
   Softness deep_balls;  ///< between two movable spheres, for deep penetrations
   Softness fixed;       ///< between a movable and an immovable or kinematic body
+  /// The same as `movable` and `fixed` for a body with joints, except in a SphereRow.
+  Softness jointed, jointed_fixed;
   /// [m/s], push-out by velocity and projection together, and projection of joints
   Real push_out_speed = 0;
   /// [m/s], push-out by velocity. The relax sweep removes most of it from the velocities, but not
@@ -75,13 +77,16 @@ inline constexpr Real kSmallestGap = Real(1e-6);
 inline constexpr Real kBiasSpeedDivisor = 6;
 
 /// Frequencies are limited to a quarter of the substep rate, and to half of it for fixed bodies:
-/// substeps cannot resolve faster springs.
+/// substeps cannot resolve faster springs. For bodies with joints, the limits are half of these. A
+/// light foot that carries a heavy body by a joint would vibrate: the contact has the mass of the
+/// foot, but its impulses move both.
 JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& settings, Real dt) {
   const Real h = dt / static_cast<Real>(settings.substeps);
   const Real inverse_h = static_cast<Real>(settings.substeps) / dt;
   const Real highest = Real(0.25) * inverse_h;
   const bool is_set = settings.contact_hertz > 0 && settings.contact_hertz < highest;
   const Real hertz = is_set ? settings.contact_hertz : highest;
+  const Real jointed_hertz = hertz < highest / 2 ? hertz : highest / 2;
   return {
       h,
       inverse_h,
@@ -89,6 +94,8 @@ JFPX_HD constexpr StepConstants make_step_constants(const SoftStepSettings& sett
       make_softness(hertz, kSphereDamping * settings.damping_ratio, h),
       make_softness(hertz, kDeepSphereDamping * settings.damping_ratio, h),
       make_softness(2 * hertz, settings.damping_ratio, h),
+      make_softness(jointed_hertz, kManifoldDamping * settings.damping_ratio, h),
+      make_softness(2 * jointed_hertz, settings.damping_ratio, h),
       settings.push_out_speed,
       settings.push_out_speed / kBiasSpeedDivisor,
       settings.restitution_threshold,

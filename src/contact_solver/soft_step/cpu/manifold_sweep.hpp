@@ -87,7 +87,7 @@ struct BundleNumbers {
   std::uint32_t a[kBundle], b[kBundle];  ///< bodies
   std::uint32_t used;                    ///< one bit per lane with a row
   std::uint32_t rolls;                   ///< rows with rolling or spinning friction
-  std::uint32_t is_jointed;              ///< rows that do not project
+  std::uint32_t is_jointed;              ///< rows with a body that has joints
 };
 
 /// The bundles of all rows.
@@ -105,7 +105,7 @@ struct ManifoldSweep {
   ManifoldBundles bundles;
   Real* bodies;  ///< SolverBody
   SweepConstants constants;
-  SweepSoftness softness;
+  SweepSoftness softness, jointed_softness;
 };
 
 /// Processes the rows [first, last) like the functions of manifold_row.hpp, except rows with

@@ -29,6 +29,7 @@ class ManifoldLanes {
         rolls_(lanes & numbers_.used & numbers_.rolls),
         lanes_(lanes & numbers_.used & ~numbers_.rolls),
         mask_(S::mask_of(lanes_)),
+        is_jointed_(S::mask_of(numbers_.is_jointed)),
         counts_(vector(bundle_vector::kPointCount)) {}
 
   /// @returns one bit per row with rolling or spinning friction. These rows are skipped.
@@ -177,8 +178,10 @@ class ManifoldLanes {
     }
     if (!S::any(active)) return 0;
     const auto bias = BiasLanes<S>::template of<kUseBias>(
-        sweep_.constants, separation, is_apart,
-        [this](Real SweepSoftness::*member) { return S::set(sweep_.softness.*member); });
+        sweep_.constants, separation, is_apart, [this](Real SweepSoftness::*member) {
+          return S::select(is_jointed_, S::set(sweep_.jointed_softness.*member),
+                           S::set(sweep_.softness.*member));
+        });
     const Vec closing = Vectors::dot(body_a_.velocity.vector - body_b_.velocity.vector, normal) +
                         (Vectors::dot(turn_a, body_a_.angular_velocity.vector) -
                          Vectors::dot(turn_b, body_b_.angular_velocity.vector));
@@ -255,8 +258,9 @@ class ManifoldLanes {
   Real* points_;
   unsigned most_;  ///< largest number of points
   unsigned rolls_, lanes_;
-  Mask mask_;   ///< of lanes_
-  Vec counts_;  ///< numbers of points
+  Mask mask_;        ///< of lanes_
+  Mask is_jointed_;  ///< of rows with a body that has joints
+  Vec counts_;       ///< numbers of points
   BodyLanes<S> body_a_, body_b_;
 };
 

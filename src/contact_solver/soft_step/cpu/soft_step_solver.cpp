@@ -1014,7 +1014,8 @@ void SoftStepSolver::sweep(Sweep sweep) {
 cpu::ManifoldSweep SoftStepSolver::manifold_sweep(bool is_fixed) {
   const StepConstants& c = constants_;
   return {manifold_setup().bundles, reinterpret_cast<Real*>(bodies_.data()), sweep_constants(c),
-          softness(is_fixed ? c.fixed : c.movable)};
+          softness(is_fixed ? c.fixed : c.movable),
+          softness(is_fixed ? c.jointed_fixed : c.jointed)};
 }
 
 cpu::SphereSweep SoftStepSolver::sphere_sweep() {
