@@ -28,9 +28,10 @@ void step(jfpx::World& world, const jfpx::CharacterSettings& settings, jfpx::Cha
 
   const jfpx::CharacterMove move = jfpx::move_character(world, settings, player, dt);
   player = move.state;
-  for (const jfpx::CharacterHit& hit : move.hits) {  // pushes, like a body of 20 kg
-    const jfpx::Vec3 impulse = hit.normal * (-20 * hit.approach_speed);
-    world.apply_impulse_at_point(hit.body, impulse, hit.point);
+  for (const jfpx::CharacterHit& hit : move.hits) {  // an inelastic hit by a body of 20 kg
+    const auto mass = world.mass(hit.body);
+    const auto impulse = hit.approach_speed * 20 * mass / (20 + mass);  // 0 for a mass of 0
+    world.apply_impulse_at_point(hit.body, hit.normal * -impulse, hit.point);
   }
 }
 

@@ -26,11 +26,6 @@ jfpx::BodyDef body(const jfpx::Shape& shape, const jfpx::Vec3& position, Real ma
   return def;
 }
 
-/// Pose for drawing, between two steps.
-jfpx::Vec3 interpolate(const jfpx::Vec3& before, const jfpx::Vec3& after, Real fraction) {
-  return before + (after - before) * fraction;
-}
-
 /// Whether a character stands: a ball at its feet, which is a little thinner, hits something that
 /// is not too steep 5 cm below.
 bool is_on_ground(const jfpx::World& world, jfpx::BodyId player) {
@@ -59,13 +54,15 @@ class Lines : public jfpx::DebugDraw {
 /// A one-way platform: bodies pass it while they rise, or while their centre is below its top.
 struct OneWay {
   jfpx::BodyId platform;
-  Real top = 0;  ///< [m]
+  Real half_height = 0;  ///< [m]
 
   void operator()(jfpx::ContactContext& context) const {
     for (jfpx::DetectedContact& contact : context.detected()) {
       if (contact.a != platform && contact.b != platform) continue;
+      const jfpx::BodyState floor = context.state(platform);
       const jfpx::BodyState body = context.state(contact.a == platform ? contact.b : contact.a);
-      contact.ignored = body.velocity.y > Real(0.1) || body.position.y < top;
+      contact.ignored = body.velocity.y - floor.velocity.y > Real(0.1) ||
+                        body.position.y < floor.position.y + half_height;
     }
   }
 };
@@ -100,7 +97,7 @@ int main() {
 
   const jfpx::BodyId ledge =
       world.add(body(jfpx::Box{{2, Real(0.1), 2}}, {-14, Real(1.9), 0}, 0, {kLevel}));
-  world.add_contact_generator(OneWay{ledge, 2});
+  world.add_contact_generator(OneWay{ledge, Real(0.1)});
   jfpx::BodyDef thrown = body(jfpx::Sphere{Real(0.25)}, {-14, Real(0.25), 0}, 1, {});
   thrown.velocity = {0, 8, 0};
   const jfpx::BodyId ball = world.add(thrown);
@@ -132,14 +129,14 @@ int main() {
 
   constexpr Real kDt = Real(1) / 60;
   Real accumulator = 0;
-  jfpx::Vec3 before, after;
+  jfpx::BodyState before, after;               // of the player
   Real loudest = 0;                            // [m/s]
   for (int frame = 0; frame < 288; ++frame) {  // 144 frames per second
     accumulator += Real(1) / 144;
     while (accumulator >= kDt) {
       accumulator -= kDt;
       jfpx::BodyState walk = world.state(player);
-      before = walk.position;
+      before = walk;
       walk.velocity = {0, walk.velocity.y, -3};
       world.set_state(player, walk);
 
@@ -150,7 +147,7 @@ int main() {
       }
 
       if (world.step().non_finite) return 1;
-      after = world.state(player).position;
+      after = world.state(player);
 
       // Events are read after the step; bodies may be removed here.
       std::vector<jfpx::BodyId> taken;
@@ -175,8 +172,8 @@ int main() {
   std::printf("the ball lies on the ledge at y = %.2f m\n",
               static_cast<double>(world.state(ball).position.y));
   std::printf("the loudest impact had %.1f m/s\n", static_cast<double>(loudest));
-  const jfpx::Vec3 drawn = interpolate(before, after, accumulator / kDt);
-  std::printf("the player is drawn at z = %.2f m\n", static_cast<double>(drawn.z));
+  const jfpx::BodyState drawn = interpolate(before, after, accumulator / kDt);
+  std::printf("the player is drawn at z = %.2f m\n", static_cast<double>(drawn.position.z));
   std::printf("the player %s\n", is_on_ground(world, player) ? "stands" : "falls");
   std::printf("the door is open by %.1f rad\n",
               static_cast<double>(world.joint_state(door).position));

@@ -1,6 +1,5 @@
 /// Forces that act on the bodies of a World in every step: the forces of the thesis (4.4.3) and the
-/// interface of user-defined forces. Aero, AeroControl and Explosion are used by the demos of the
-/// thesis only.
+/// interface of user-defined forces. Aero and AeroControl are used by the demos of the thesis only.
 #pragma once
 
 #include <jfpx/step_view.hpp>
@@ -139,7 +138,10 @@ struct JFPX_API Buoyancy {
 };
 
 /// Pressure wave: a spherical shell that expands from a point. It wakes the bodies in the shell,
-/// pushes them outwards and fades. The force rises linearly to the middle of the shell and falls.
+/// pushes them outwards and fades with time, not with distance. The force rises linearly to the
+/// middle of the shell and falls. Like all forces, it wakes all bodies when it is added and
+/// removed; remove it after its duration. A blast within one step is an impulse on the bodies of
+/// World::bodies_within().
 struct JFPX_API Explosion {
   Vec3 centre = {};     ///< [m]
   Real start = 0;       ///< [s], of the world's time

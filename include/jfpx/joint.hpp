@@ -10,8 +10,8 @@
 namespace jfpx {
 inline namespace JFPX_ABI {
 
-/// Identifies a joint of one World for the lifetime of the joint. The id of a removed joint is
-/// never reused.
+/// Identifies a joint of one World for the lifetime of the joint. The id of a removed joint is not
+/// reused, unless World::restore() goes back to a time before the joint was added.
 struct JointId {
   std::uint32_t index = 0xffffffffu;
   std::uint32_t generation = 0;

@@ -359,11 +359,12 @@ class JFPX_API World {
   std::span<const ContactGeneratorId> contact_generators() const;
 
   /// The first hit of a ray; among bodies at the same distance, the one with the lowest index.
-  /// Queries include sleeping and immovable bodies and sensors, and ignore collision filters. They
-  /// use a bounding-volume tree and take O(log bodies) time for usual scenes, plus the time of the
-  /// results. The first query after a step, and after a body was added, removed or moved by
-  /// set_state(), builds the tree in O(bodies) time, about 20 ns per body; concurrent queries wait
-  /// for it. Half-spaces and planes are not in the tree and are always tested.
+  /// A ray does not hit the back of a one-sided triangle. Queries include sleeping and immovable
+  /// bodies and sensors, and ignore collision filters. They use a bounding-volume tree and take
+  /// O(log bodies) time for usual scenes, plus the time of the results. The first query after a
+  /// step, and after a body was added, removed or moved by set_state(), builds the tree in
+  /// O(bodies) time, about 20 ns per body; concurrent queries wait for it. Half-spaces and planes
+  /// are not in the tree and are always tested.
   /// @throws InvalidArgument for a field of the ray that is out of its range; std::bad_alloc
   std::optional<RayHit> cast_ray(const Ray& ray, const BodyFilter& filter = {}) const;
   /// All hits of a ray, sorted by distance, then by index; one hit per body.
@@ -401,10 +402,12 @@ class JFPX_API World {
   /// Bodies that overlap a solid, in the order of bodies(). Exact contact counts; the arithmetic is
   /// that of contacts().
   /// @param position [m], of the origin of the shape's axes
+  /// @param filter called for the bodies that overlap
   /// @throws InvalidArgument for a shape, position or orientation that is invalid for a body;
   ///   std::bad_alloc
   std::vector<BodyId> overlapping(const SolidShape& shape, const Vec3& position,
-                                  const Quat& orientation = {}) const;
+                                  const Quat& orientation = {},
+                                  const BodyFilter& filter = {}) const;
 
   /// Copies all data that affect the following steps: bodies, joints, ids, ignored pairs, settings,
   /// sleep, accumulated forces, contacts with their impulses, and forces of force.hpp. Depends on

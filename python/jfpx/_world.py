@@ -1414,11 +1414,13 @@ class World:
             [CharacterHit(BodyId(*hit[0]), *hit[1:]) for hit in hits])
 
     def overlapping(self, shape: dict[str, Any], position: Vector,
-                    orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:
+                    orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                    filter: Callable[[BodyId], bool] | None = None) -> list[BodyId]:
         """Bodies that overlap or touch a solid, in the order of `bodies`. Parameters and exceptions
         are those of cast_shape()."""
         found = self._core.overlapping(self._solid(shape), _arrays.triple(position, "position"),
-                                       _arrays.triple(orientation, "orientation", 4))
+                                       _arrays.triple(orientation, "orientation", 4),
+                                       _of_body(filter))
         return [BodyId(*body) for body in found]
 
     def overlapping_sphere(self, centre: Vector, radius: float) -> list[BodyId]:

@@ -352,11 +352,14 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
       .def("move_character", &move_one, nb::arg("numbers"), nb::arg("up"), nb::arg("position"),
            nb::arg("velocity"), nb::arg("ground"), nb::arg("body").none(), nb::arg("normal"),
            nb::arg("dt"), nb::arg("filter").none())
-      .def("overlapping",
-           [](const PythonWorld& self, const Scene& shape, Triple position, Quadruple orientation) {
-             return to_tuples(self.get().overlapping(to_solid_shape(shape), to_vec3(position),
-                                                     to_quat(orientation)));
-           })
+      .def(
+          "overlapping",
+          [](const PythonWorld& self, const Scene& shape, Triple position, Quadruple orientation,
+             const nb::object& filter) {
+            return to_tuples(self.get().overlapping(to_solid_shape(shape), to_vec3(position),
+                                                    to_quat(orientation), to_filter(filter)));
+          },
+          nb::arg("shape"), nb::arg("position"), nb::arg("orientation"), nb::arg("filter").none())
       .def("overlapping_sphere",
            [](const PythonWorld& self, Real radius, Triple centre) {
              return to_tuples(self.get().overlapping(Sphere{radius}, to_vec3(centre)));

@@ -40,14 +40,6 @@ inline Quat interpolate(const Quat& a, const Quat& b, Real share) {
                          a.z * rest + b.z * way});
 }
 
-/// Position and orientation; the velocities are zero.
-inline BodyState interpolate(const BodyState& a, const BodyState& b, Real share) {
-  return {interpolate(a.position, b.position, share),
-          interpolate(a.orientation, b.orientation, share),
-          {},
-          {}};
-}
-
 }  // namespace view
 }  // namespace JFPX_ABI
 }  // namespace jfpx

@@ -178,12 +178,13 @@ std::vector<BodyDistance> World::bodies_within(const DistanceQuery& query,
 }
 
 std::vector<BodyId> World::overlapping(const SolidShape& shape, const Vec3& position,
-                                       const Quat& orientation) const {
+                                       const Quat& orientation, const BodyFilter& filter) const {
   const QuerySolid solid(shape, checked_pose(shape, position, orientation));
   const BodyStore& bodies = impl_->bodies_with_states();
   std::vector<BodyId> found;
   impl_->tree_of(bodies).visit_around(position, solid.half_extents, [&](std::uint32_t body) {
-    if (solid.touches(bodies, body)) found.push_back(bodies.id(body));
+    const BodyId id = bodies.id(body);
+    if (solid.touches(bodies, body) && accepts(filter, id)) found.push_back(id);
   });
   std::ranges::sort(found, {}, &BodyId::index);
   return found;

@@ -538,6 +538,8 @@ def test_a_cast_turns_the_solid(dtype):
     np.testing.assert_array_equal(hits.bodies, [0, 0, 0, -1])
     assert world.overlapping(stick, (0, 1.2, 0)) == world.bodies
     assert world.overlapping(stick, (0, 1.2, 0), (half, half, 0, 0)) == []
+    assert world.overlapping(stick, (0, 1.2, 0), filter=lambda body: body != world.bodies[0]) == \
+        world.bodies[1:]
 
 
 def test_a_function_is_a_force(dtype):

@@ -33,6 +33,52 @@ BodyDef cube(const Vec3& position) {
   return def;
 }
 
+JFPX_SOFT_STEP_SUITE(MovingTo);
+
+TEST_P(MovingTo, FollowsThePosesOfAPathAndStopsThere) {
+  World world = world_with({kinematic(Box{{1, 1, 1}}, {}, {})});
+  const BodyId id = world.bodies()[0];
+  const Real dt = world.settings().dt;
+  const auto move = [&](const Vec3& position, const Quat& orientation) {
+    world.set_state(id, moving_to(world.state(id), position, orientation, dt));
+    world.step();
+    const BodyState state = world.state(id);
+    EXPECT_LT(length(state.position - position), 2e-6_r);
+    const Quat error = state.orientation * conjugate(orientation);
+    EXPECT_LT(length(Vec3{error.x, error.y, error.z}), 2e-6_r);
+  };
+  for (const Real angle : {0.08_r, 0.7_r, 1.6_r, 3.1_r}) {  // of a step
+    for (int n = 1; n <= 90; ++n) {
+      const Real t = static_cast<Real>(n) * dt;
+      const Quat q = from_axis_angle({1, 2, 3}, static_cast<Real>(n) * angle);
+      move({t, t * t, -t}, n % 2 == 0 ? q : Quat{-q.w, -q.x, -q.y, -q.z});
+    }
+  }
+  const BodyState end = world.state(id);
+  const BodyState stopped = moving_to(end, end.position, end.orientation, dt);
+  EXPECT_EQ(stopped.velocity, Vec3{});
+  EXPECT_EQ(stopped.angular_velocity, Vec3{});
+}
+
+TEST(Interpolate, TurnsAlongTheShorterArc) {
+  BodyState before, after;
+  before.position = {1, 2, 3}, after.position = {3, 2, 1};
+  before.velocity = {2, 0, 0}, after.angular_velocity = {0, 4, 0};
+  before.orientation = from_axis_angle({0, 0, 1}, 0.2_r);
+  const Quat q = from_axis_angle({0, 0, 1}, 0.6_r);
+  for (const Quat& same : {q, Quat{-q.w, -q.x, -q.y, -q.z}}) {
+    after.orientation = same;
+    const BodyState middle = interpolate(before, after, 0.5_r);
+    EXPECT_EQ(middle.position, (Vec3{2, 2, 2}));
+    EXPECT_EQ(middle.velocity, (Vec3{1, 0, 0}));
+    EXPECT_EQ(middle.angular_velocity, (Vec3{0, 2, 0}));
+    const Quat expected = from_axis_angle({0, 0, 1}, 0.4_r);
+    EXPECT_NEAR(middle.orientation.w, expected.w, 1e-6_r);
+    EXPECT_NEAR(middle.orientation.z, expected.z, 1e-6_r);
+    EXPECT_EQ(interpolate(before, after, 0).position, before.position);
+  }
+}
+
 TEST_P(Kinematic, MovesByItsVelocitiesAlone) {
   BodyDef def = kinematic(Sphere{1}, {1, 2, 3}, {0.5_r, 0, -1});
   def.angular_velocity = {0, 0, 1};

@@ -443,6 +443,11 @@ TEST(Overlap, ComesInTheOrderOfBodiesAndCountsAnExactTouch) {
   const auto ids = world.bodies();
   EXPECT_THAT(world.overlapping(Sphere{3}, {7.5_r, 0, 0}), ElementsAre(ids[1], ids[2]));
   EXPECT_THAT(world.overlapping(Sphere{4}, {0, 0, 0}), ElementsAre(ids[2]));
+  const auto is_other = [&](BodyId id) {
+    EXPECT_THAT((std::vector{ids[1], ids[2]}), ::testing::Contains(id));  // the bodies that overlap
+    return id != ids[1];
+  };
+  EXPECT_THAT(world.overlapping(Sphere{3}, {7.5_r, 0, 0}, {}, is_other), ElementsAre(ids[2]));
   EXPECT_THAT(world.overlapping(Sphere{3.99_r}, {0, 0, 0}), ElementsAre());
   EXPECT_THAT(world.overlapping(Box{{4, 1, 1}}, {0, 0, 0}), ElementsAre(ids[2]));
   EXPECT_THAT(world.overlapping(Box{{8, 1, 1}}, {12, 0, 0}), ElementsAre(ids[0], ids[1], ids[2]));
