@@ -48,7 +48,7 @@ class HostTeam {
     if (shared_ != nullptr) shared_->barrier.arrive_and_wait();
   }
   /// Differs between runs of programs, so that rows and bodies are distributed differently.
-  std::uint32_t warps() const { return 1u << random_bits() % 12; }
+  std::uint32_t warps() const { return 1u << random_bits() % 8; }
   const device::RowBins& cached_bins(const device::RowBins* bins) const { return bins[part_]; }
   std::uint32_t part() const { return part_; }
   HostTeam team_of_part() const {
