@@ -101,12 +101,8 @@ struct BodyState {
 /// @param t [-], 0: `before`, 1: `after`
 JFPX_HD inline BodyState interpolate(const BodyState& before, const BodyState& after, Real t) {
   const auto mix = [t](const Vec3& a, const Vec3& b) { return a * (1 - t) + b * t; };
-  const Quat &p = before.orientation, &q = after.orientation;
-  const bool is_opposite = p.w * q.w + p.x * q.x + p.y * q.y + p.z * q.z < 0;
-  const Real r = 1 - t, s = is_opposite ? -t : t;
   return {
-      mix(before.position, after.position),
-      normalized(Quat{p.w * r + q.w * s, p.x * r + q.x * s, p.y * r + q.y * s, p.z * r + q.z * s}),
+      mix(before.position, after.position), interpolate(before.orientation, after.orientation, t),
       mix(before.velocity, after.velocity), mix(before.angular_velocity, after.angular_velocity)};
 }
 

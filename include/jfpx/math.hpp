@@ -145,6 +145,13 @@ JFPX_HD inline Quat rotated_by(const Quat& q, const Vec3& r) {
 JFPX_HD inline bool is_finite(const Quat& q) {
   return is_finite(q.w) && is_finite(q.x) && is_finite(q.y) && is_finite(q.z);
 }
+/// Normalized linear interpolation of rotations along the shorter arc: a for t = 0, b for t = 1.
+/// The angular velocity is nearly constant for small rotations.
+JFPX_HD inline Quat interpolate(const Quat& a, const Quat& b, Real t) {
+  const Real s = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -t : t, r = 1 - t;
+  return normalized(
+      Quat{a.w * r + b.w * s, a.x * r + b.x * s, a.y * r + b.y * s, a.z * r + b.z * s});
+}
 /// The unit quaternion that rotates by `angle` [rad] about `axis`, counterclockwise as seen from
 /// the tip of the axis. Uses no functions of the C library, so its bits are the same on all
 /// machines.

@@ -31,15 +31,6 @@ struct RunState {
 /// Linear interpolation between two steps, because pictures are not synchronous with steps.
 inline Vec3 interpolate(const Vec3& a, const Vec3& b, Real share) { return a + (b - a) * share; }
 
-/// Normalized linear interpolation along the shorter arc; its angular velocity is nearly constant
-/// for the small rotation of a step.
-inline Quat interpolate(const Quat& a, const Quat& b, Real share) {
-  const Real way = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -share : share;
-  const Real rest = 1 - share;
-  return normalized(Quat{a.w * rest + b.w * way, a.x * rest + b.x * way, a.y * rest + b.y * way,
-                         a.z * rest + b.z * way});
-}
-
 }  // namespace view
 }  // namespace JFPX_ABI
 }  // namespace jfpx
