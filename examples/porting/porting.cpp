@@ -4,9 +4,16 @@
 #include <jfpx/world.hpp>
 
 #include <algorithm>
+#include <condition_variable>
 #include <cstdint>
 #include <cstdio>
+#include <deque>
+#include <functional>
+#include <iterator>
+#include <mutex>
 #include <optional>
+#include <thread>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -67,6 +74,42 @@ struct OneWay {
   }
 };
 
+/// The job system of the game: two threads that run jobs in the order of their addition.
+class Jobs {
+ public:
+  Jobs() : threads_{std::thread([this] { work(); }), std::thread([this] { work(); })} {}
+  ~Jobs() {
+    for (std::size_t i = 0; i < std::size(threads_); ++i) add({});
+    for (std::thread& thread : threads_) thread.join();
+  }
+  Jobs(const Jobs&) = delete;
+  Jobs& operator=(const Jobs&) = delete;
+  /// An empty job ends a thread.
+  void add(std::function<void()> job) {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(std::move(job));
+    changed_.notify_one();
+  }
+
+ private:
+  void work() {
+    for (;;) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return !jobs_.empty(); });
+      const std::function<void()> job = std::move(jobs_.front());
+      jobs_.pop_front();
+      lock.unlock();
+      if (!job) return;
+      job();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::function<void()>> jobs_;
+  std::thread threads_[2];
+};
+
 /// Makes a body immovable where it is.
 void freeze(jfpx::World& world, jfpx::BodyId id) {
   jfpx::BodyDef body = world.definition(id);
@@ -80,7 +123,10 @@ void freeze(jfpx::World& world, jfpx::BodyId id) {
 int main() {
   jfpx::Scene scene;  // steps of 1/60 s, gravity (0, -9.81, 0) in each BodyDef
   scene.bodies.push_back(body(jfpx::Box{{20, 1, 20}}, {0, -1, 0}, 0, {kLevel}));
-  jfpx::World world(scene, {.hit_speed = 1});
+  // A step runs in this thread and in up to two jobs.
+  Jobs jobs;
+  jfpx::World world(
+      scene, {.threads = 3, .enqueue_task = std::bind_front(&Jobs::add, &jobs), .hit_speed = 1});
 
   jfpx::BodyDef platform = body(jfpx::Box{{2, Real(0.1), 2}}, {8, Real(0.1), 0}, 0, {kLevel});
   platform.kinematic = true;

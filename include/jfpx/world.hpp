@@ -46,6 +46,17 @@ struct WorldSettings {
   /// Number of threads of a step on the CPU, at most 256; 0: one per core. With
   /// Solver::worst_first, only the search for sphere contacts uses them.
   unsigned threads = 1;
+  /// Enqueues a task that any thread of the program calls once, and returns without waiting for it,
+  /// as the task system of Box2D or the dispatcher of PhysX; empty: jfpx starts worker threads. A
+  /// step on the CPU enqueues `threads` - 1 tasks, unless the world is at rest; with several ranks,
+  /// a step that is repeated enqueues them again. A task takes part in the step, and occupies its
+  /// thread until the step ends: where there is nothing to do, it polls for up to a millisecond,
+  /// then sleeps. A task that begins later returns at once, even after the World is destroyed, and
+  /// so does one that the stepping thread calls. A step therefore waits for no task that has not
+  /// begun, and may itself be a job of the program, but not one of several ranks. Forces, contact
+  /// generators and filters must not wait for other jobs. The bits do not depend on the tasks.
+  /// Other functions of the world use the calling thread only.
+  std::function<void(std::function<void()> task)> enqueue_task = {};
   BroadPhase broad_phase = BroadPhase::cells;
   /// [m/s], > 0: the least approach speed of World::hit_events(), for example 1. If it is infinite,
   /// there are no hit events. Has no effect on the motion.
@@ -193,8 +204,8 @@ class JFPX_API World {
   /// if a value is no longer finite, or a coordinate exceeds kMaxCoordinate, the step is undone and
   /// StepReport::non_finite is set. Further steps are also undone until that body is removed or its
   /// state is replaced.
-  /// @throws OutOfMemory, DeviceError and the exceptions of forces and contact generators; the step
-  ///   is then undone
+  /// @throws OutOfMemory, DeviceError and the exceptions of forces, contact generators and
+  ///   WorldSettings::enqueue_task; the step is then undone
   StepReport step();
 
   /// Living bodies in the order of their indices. Valid until a body is added or removed.

@@ -73,7 +73,8 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   static std::shared_ptr<Workers> acquire_others(unsigned threads) noexcept;
 
   /// @param threads including the calling thread of run()
-  explicit Workers(unsigned threads);
+  /// @param starts_threads false: all other threads are those that call help()
+  Workers(unsigned threads, bool starts_threads);
   ~Workers();
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
@@ -89,6 +90,15 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   /// Requires acquire(). @return the exception of the lowest chunk that threw one
   std::exception_ptr run(const Loop& loop);
 
+  /// Whether threads may take part in a loop.
+  bool may_share() const noexcept { return period_ != kNoPeriod || !workers_.empty(); }
+  /// Begins a period in which help() takes part in the loops of this thread. @returns its number
+  std::uint64_t begin_period() noexcept;
+  void end_period() noexcept;
+  /// Takes part in loops until the end of a period. Returns at once if the period has ended, or in
+  /// the thread of the loops.
+  void help(std::uint64_t period) noexcept;
+
  private:
   /// Part of a loop, limited to less than kCount chunks.
   struct Job {
@@ -102,10 +112,14 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
     /// Those that no thread has taken, as of_job(). The first thread that needs the value of a job
     /// sets it: the caller need not write to the caches of all threads.
     std::atomic<std::uint64_t> left{0};
-    /// Those that this thread has completed, of any thread, as of_job(). Only it writes the value.
+    /// Those that this thread has completed, of any thread, as of_job(). Only the thread that has
+    /// this item writes the value.
     alignas(64) std::atomic<std::uint64_t> done{0};
     /// The job with phases whose data this worker may read, or 0.
     std::atomic<std::uint64_t> joined{0};
+    /// Whether a thread in help() has this item. The next one to have it may do so in the same job:
+    /// a thread leaves a job when all of its chunks are taken, so that `done` is not overwritten.
+    std::atomic<bool> is_taken{false};
   };
 
   static bool may_start(unsigned threads);
@@ -117,6 +131,8 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   void join(unsigned self, std::uint64_t published);
   void take_phases(unsigned self, std::uint64_t number);
   void work(unsigned self);
+  void take_part(unsigned self);
+  unsigned take_place(std::uint64_t period);
   void wait_for_job(std::uint32_t* seen);
   void poll(std::uint32_t last);
   bool is_short(std::uint64_t job) const { return count_of(job) <= kFewChunks * thread_count_; }
@@ -148,6 +164,10 @@ class ThreadPool::Workers : public std::enable_shared_from_this<Workers> {
   /// The current job. A thread may read it only between taking a chunk and reporting it, or after
   /// it has joined, because the next job overwrites it.
   Job job_;
+  static constexpr std::uint64_t kNoPeriod = 0;
+  std::atomic<std::uint64_t> period_{kNoPeriod};  ///< in which help() takes part
+  std::atomic<std::thread::id> caller_;           ///< thread of the loops of the period
+  std::uint64_t last_period_ = kNoPeriod;
   /// Whether the caller sleeps until all chunks are completed.
   alignas(64) std::atomic<std::uint32_t> caller_sleeps_{0};
 
@@ -216,15 +236,19 @@ bool ThreadPool::Workers::may_start(unsigned threads) {
 }
 
 std::shared_ptr<ThreadPool::Workers> ThreadPool::Workers::start(unsigned threads) {
-  auto workers = std::make_shared<Workers>(threads);
+  auto workers = std::make_shared<Workers>(threads, true);
   workers->next_ = std::exchange(list_, workers.get());
   return workers;
 }
 
-ThreadPool::Workers::Workers(unsigned threads) : requested_(threads) {
+ThreadPool::Workers::Workers(unsigned threads, bool starts_threads) : requested_(threads) {
   // A polling worker must not take the core of another thread.
   if (threads <= usable_cores()) polls_ = kPolls;
   chunks_ = std::make_unique<Chunks[]>(threads);
+  if (!starts_threads) {
+    thread_count_ = threads;
+    return;
+  }
   workers_.reserve(threads - 1);
   try {
     for (unsigned self = 1; self < threads; ++self) {
@@ -341,14 +365,50 @@ void ThreadPool::Workers::take_phases(unsigned self, std::uint64_t number) {
 
 void ThreadPool::Workers::work(unsigned self) {
   std::uint32_t seen = 0;
-  for (wait_for_job(&seen); !stopped_; wait_for_job(&seen)) {
-    const std::uint64_t published = published_.load(std::memory_order_acquire);
-    if (count_of(published) == kHasPhases) {
-      join(self, published);
-    } else {
-      take_chunks(self, published);
+  for (wait_for_job(&seen); !stopped_; wait_for_job(&seen)) take_part(self);
+}
+
+/// Takes part in the last job that began, unless it has ended.
+void ThreadPool::Workers::take_part(unsigned self) {
+  const std::uint64_t published = published_.load(std::memory_order_acquire);
+  if (count_of(published) == kHasPhases) {
+    join(self, published);
+  } else {
+    take_chunks(self, published);
+  }
+}
+
+std::uint64_t ThreadPool::Workers::begin_period() noexcept {
+  caller_ = std::this_thread::get_id();
+  period_ = ++last_period_;
+  return last_period_;
+}
+
+/// A thread that waits for a job finds an empty one, and then the end of the period.
+void ThreadPool::Workers::end_period() noexcept {
+  period_ = kNoPeriod;
+  publish({}, 0);
+}
+
+void ThreadPool::Workers::help(std::uint64_t period) noexcept {
+  if (period_ != period || caller_.load() == std::this_thread::get_id()) return;
+  const unsigned self = take_place(period);
+  if (self == 0) return;
+  const FloatingPointEnvironment environment;
+  for (std::uint32_t seen = number_; period_ == period; wait_for_job(&seen)) take_part(self);
+  environment.apply();
+  chunks_[self].is_taken = false;
+}
+
+/// The number of a thread for the calling thread; 0 if the period has ended. There is one for each
+/// task of a period, but threads of the last period may still have them for a short time.
+unsigned ThreadPool::Workers::take_place(std::uint64_t period) {
+  for (; period_ == period; std::this_thread::yield()) {
+    for (unsigned self = 1; self < thread_count_; ++self) {
+      if (!chunks_[self].is_taken.exchange(true)) return self;
     }
   }
+  return 0;
 }
 
 /// @param seen number of the last job
@@ -478,22 +538,47 @@ ThreadPool::ThreadPool(unsigned threads) {
   if (threads == 0) threads = std::min(usable_cores(), kMaxThreads);
   if (threads > 1) workers_ = Workers::shared(threads);
 }
+ThreadPool::ThreadPool(unsigned threads, EnqueueTask enqueue) : enqueue_(std::move(enqueue)) {
+  check(threads);
+  if (threads == 0) threads = std::min(usable_cores(), kMaxThreads);
+  if (threads > 1) workers_ = std::make_shared<Workers>(threads, false);
+}
 ThreadPool::~ThreadPool() = default;
+
+ThreadPool::Helpers::Helpers(const ThreadPool& pool) {
+  if (pool.workers_ == nullptr || !pool.enqueue_) return;
+  workers_ = pool.workers_;
+  const std::uint64_t period = workers_->begin_period();
+  try {
+    for (unsigned i = 1; i < pool.threads(); ++i) {
+      pool.enqueue_([workers = workers_, period] { workers->help(period); });
+    }
+  } catch (...) {
+    workers_->end_period();
+    throw;
+  }
+}
+ThreadPool::Helpers::~Helpers() {
+  if (workers_ != nullptr) workers_->end_period();
+}
 
 unsigned ThreadPool::threads() const noexcept {
   return workers_ == nullptr ? 1 : workers_->threads();
 }
 
+void ThreadPool::run_alone(const Loop& loop) {
+  for (std::size_t phase = 0; phase < std::max<std::size_t>(loop.phases, 1); ++phase) {
+    const std::size_t chunks = loop.phases > 0 ? loop.chunks_of(loop.body, phase) : loop.chunks;
+    for (std::size_t i = 0; i < chunks; ++i) loop.call(loop.body, phase, i);
+  }
+}
+
 void ThreadPool::run_shared(const Loop& loop) {
+  if (!workers_->may_share()) return run_alone(loop);
   if (!workers_->acquire()) {
+    if (enqueue_) return run_alone(loop);
     std::shared_ptr<Workers> others = Workers::acquire_others(workers_->requested());
-    if (others == nullptr) {
-      for (std::size_t phase = 0; phase < std::max<std::size_t>(loop.phases, 1); ++phase) {
-        const std::size_t chunks = loop.phases > 0 ? loop.chunks_of(loop.body, phase) : loop.chunks;
-        for (std::size_t i = 0; i < chunks; ++i) loop.call(loop.body, phase, i);
-      }
-      return;
-    }
+    if (others == nullptr) return run_alone(loop);
     workers_ = std::move(others);
   }
   const std::exception_ptr error = workers_->run(loop);

@@ -5,10 +5,15 @@
 #include <jfpx/config.hpp>
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
+
+/// Enqueues a task that any thread calls once, at any time, and returns without waiting for it.
+using EnqueueTask = std::function<void(std::function<void()> task)>;
 
 /// The calling thread takes part in each loop. Every thread starts with its own consecutive chunks,
 /// which are the same in equal loops, so that caches keep their data; then it takes chunks of other
@@ -33,12 +38,19 @@ class JFPX_API ThreadPool {
   ///   if the system refuses to start threads.
   /// @throws InvalidArgument if `threads` exceeds kMaxThreads.
   explicit ThreadPool(unsigned threads);
+  /// A pool without threads of its own. While a Helpers object exists, tasks take part in the
+  /// loops; otherwise the calling thread runs them alone.
+  /// @param threads most threads of a loop, including the caller's; 0: one per core
+  /// @throws as above
+  ThreadPool(unsigned threads, EnqueueTask enqueue);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
   /// Number of threads, including the caller's.
   unsigned threads() const noexcept;
+
+  class Helpers;
 
   /// Calls body(chunk) for every chunk in [0, chunks), in any order and from any thread, and
   /// returns after the last call. If several chunks throw, rethrows the exception of the lowest
@@ -96,9 +108,27 @@ class JFPX_API ThreadPool {
     std::size_t phases = 0;  ///< 0: a loop without phases
   };
 
+  static void run_alone(const Loop& loop);
   void run_shared(const Loop& loop);
 
   std::shared_ptr<Workers> workers_;  ///< null with one thread
+  EnqueueTask enqueue_;               ///< empty: the workers have threads of their own
+};
+
+/// Lets tasks take part in the loops of a pool while it exists. Has no effect on a pool with
+/// threads of its own. A task occupies its thread until the object is destroyed. The destructor
+/// does not wait for tasks: those that begin later return at once, even after the pool is
+/// destroyed. So does a task that the thread of the loops itself calls.
+class JFPX_API ThreadPool::Helpers {
+ public:
+  /// @throws the exceptions of the function that enqueues tasks
+  explicit Helpers(const ThreadPool& pool);
+  ~Helpers();
+  Helpers(const Helpers&) = delete;
+  Helpers& operator=(const Helpers&) = delete;
+
+ private:
+  std::shared_ptr<Workers> workers_;  ///< null: no effect
 };
 
 }  // namespace JFPX_ABI

@@ -298,9 +298,11 @@ StepReport World::Impl::make_step() {
     report.total_ms = watch.lap_ms();
     return report;
   }
+  std::optional<ThreadPool::Helpers> helpers;
   try {
     if (ranks != nullptr) start_step_of_ranks();
     choose_device(&report);
+    if (!steps_on_device) helpers.emplace(*pool);
     // A step on the device changes nothing on the host, unless the host applies the forces.
     is_saved = false;
     if (!steps_on_device) save_for_undo();
@@ -319,6 +321,7 @@ StepReport World::Impl::make_step() {
     }
   } catch (const WorldRanks::OwnersChanged&) {
     undo();
+    helpers.reset();
     return make_step();
   } catch (const std::bad_alloc&) {
     undo();
@@ -385,7 +388,9 @@ World::World(const Scene& scene, const WorldSettings& settings) {
                           "; it must be > 0; infinity is allowed");
   }
   check_devices(scene, settings);
-  auto pool = std::make_unique<ThreadPool>(settings.threads);
+  auto pool = settings.enqueue_task
+                  ? std::make_unique<ThreadPool>(settings.threads, settings.enqueue_task)
+                  : std::make_unique<ThreadPool>(settings.threads);
   SphereColliderOptions options = settings.collider;
   std::vector<int> devices = settings.devices;
   if (!devices.empty()) {

@@ -10,18 +10,23 @@
 #include <atomic>
 #include <cfenv>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <iterator>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <numeric>
 #include <random>
 #include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #if defined(__x86_64__)
@@ -260,6 +265,164 @@ TEST(ThreadPool, FlushesDenormalsWhereTheCallerDoes) {
     });
     flush_denormals(false);
     EXPECT_EQ(flushed, std::vector<int>(kChunks, flush));
+  }
+}
+
+/// Threads of a program that run tasks in the order of their addition.
+class TaskThreads {
+ public:
+  explicit TaskThreads(unsigned threads) {
+    for (unsigned i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+  }
+  ~TaskThreads() {
+    {
+      const std::lock_guard lock(mutex_);
+      ends_ = true;
+    }
+    changed_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+  }
+  void add(std::function<void()> task) {
+    {
+      const std::lock_guard lock(mutex_);
+      tasks_.push_back(std::move(task));
+    }
+    changed_.notify_one();
+  }
+
+ private:
+  void work() {
+    for (;;) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return ends_ || !tasks_.empty(); });
+      if (tasks_.empty()) return;
+      const std::function<void()> task = std::move(tasks_.front());
+      tasks_.pop_front();
+      lock.unlock();
+      task();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::function<void()>> tasks_;
+  bool ends_ = false;
+  std::vector<std::thread> threads_;
+};
+
+TEST(ThreadPool, TasksTakePartInLoopsWhileHelpersExist) {
+  TaskThreads tasks(3);
+  ThreadPool pool(4, [&](std::function<void()> task) { tasks.add(std::move(task)); });
+  EXPECT_EQ(pool.threads(), 4u);
+  const auto count_threads_of = [&] {
+    std::vector<std::thread::id> ids(16);
+    pool.run(ids.size(), [&](std::size_t i) { ids[i] = std::this_thread::get_id(); });
+    return std::set(ids.begin(), ids.end()).size();
+  };
+  EXPECT_EQ(count_threads_of(), 1u);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    const ThreadPool::Helpers helpers(pool);
+    EXPECT_EQ(threads_of(pool).size(), 4u);  // ends only if all take part
+    std::vector<int> runs(60);
+    pool.run_phases(
+        6, [](std::size_t phase) { return phase; },
+        [&](std::size_t phase, std::size_t chunk) { ++runs[10 * phase + chunk]; });
+    for (std::size_t i = 0; i < runs.size(); ++i) EXPECT_EQ(runs[i], i % 10 < i / 10 ? 1 : 0) << i;
+  }
+  EXPECT_EQ(count_threads_of(), 1u);
+}
+
+TEST(ThreadPool, LoopsDoNotWaitForTasksThatHaveNotBegun) {
+  std::vector<std::function<void()>> tasks;
+  auto pool = std::make_unique<ThreadPool>(
+      3, [&](std::function<void()> task) { tasks.push_back(std::move(task)); });
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const ThreadPool::Helpers helpers(*pool);
+    EXPECT_EQ(tasks.size(), 2u * (static_cast<unsigned>(repeat) + 1));
+    std::vector<int> runs(100);
+    pool->run(runs.size(), [&](std::size_t i) { ++runs[i]; });
+    EXPECT_EQ(runs, std::vector<int>(runs.size(), 1));
+    if (repeat == 0) continue;
+    tasks[0]();  // of the first helpers: returns, although others exist
+  }
+  pool.reset();
+  for (const auto& task : tasks) task();
+}
+
+/// As a job system does whose wait() runs jobs.
+TEST(ThreadPool, ATaskThatTheThreadOfTheLoopsCallsReturns) {
+  std::function<void()> last;
+  ThreadPool pool(2, [&](std::function<void()> task) {
+    task();
+    last = std::move(task);
+  });
+  const ThreadPool::Helpers helpers(pool);
+  std::vector<int> runs(10);
+  pool.run(runs.size(), [&](std::size_t i) {
+    ++runs[i];
+    last();
+  });
+  EXPECT_EQ(runs, std::vector<int>(10, 1));
+}
+
+/// Tasks of a period run in other threads than those of the one before, which may still be leaving.
+TEST(ThreadPool, EachTaskTakesPartAlsoIfThereAreMoreThreadsThanTasks) {
+  TaskThreads tasks(5);
+  ThreadPool pool(2, [&](std::function<void()> task) { tasks.add(std::move(task)); });
+  for (int period = 0; period < 300; ++period) {
+    const ThreadPool::Helpers helpers(pool);
+    EXPECT_EQ(threads_of(pool).size(), 2u);  // ends only if the task takes part
+  }
+}
+
+TEST(ThreadPool, HelpersEndWithTheErrorOfTheFunctionThatEnqueues) {
+  int calls = 0;
+  ThreadPool pool(3, [&](const std::function<void()>&) {
+    if (++calls == 2) throw std::runtime_error("full");
+  });
+  EXPECT_THROW(ThreadPool::Helpers helpers(pool), std::runtime_error);
+  std::vector<int> runs(10);
+  pool.run(runs.size(), [&](std::size_t i) { ++runs[i]; });
+  EXPECT_EQ(runs, std::vector<int>(10, 1));
+}
+
+TEST(ThreadPool, TasksKeepTheFloatingPointEnvironmentOfTheirThreads) {
+  std::atomic<int> rounding{-1};
+  TaskThreads tasks(1);
+  ThreadPool pool(2, [&](std::function<void()> task) {
+    tasks.add([&rounding, task = std::move(task)] {
+      std::fesetround(FE_UPWARD);
+      task();
+      rounding = std::fegetround();
+      std::fesetround(FE_TONEAREST);
+    });
+  });
+  std::vector<int> modes(2);
+  {
+    const ThreadPool::Helpers helpers(pool);
+    std::atomic<int> begun{0};
+    pool.run(2, [&](std::size_t i) {
+      for (++begun; begun < 2;) std::this_thread::yield();
+      modes[i] = std::fegetround();
+    });
+  }
+  while (rounding == -1) std::this_thread::yield();
+  EXPECT_EQ(modes, std::vector<int>(2, FE_TONEAREST));
+  EXPECT_EQ(rounding, FE_UPWARD);
+}
+
+TEST(ThreadPool, RunsEveryChunkOnceWhileTasksComeAndGo) {
+  const test::Seed seed;
+  std::mt19937 random(seed);
+  TaskThreads tasks(2);
+  ThreadPool pool(4, [&](std::function<void()> task) { tasks.add(std::move(task)); });
+  for (int period = 0; period < 300; ++period) {
+    const ThreadPool::Helpers helpers(pool);
+    for (std::uint64_t loops = random() % 5; loops > 0; --loops) {
+      std::vector<int> runs(random() % 40);
+      pool.run(runs.size(), [&](std::size_t i) { ++runs[i]; });
+      EXPECT_EQ(runs, std::vector<int>(runs.size(), 1));
+    }
   }
 }
 

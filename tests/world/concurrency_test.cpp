@@ -2,7 +2,11 @@
 /// the thread sanitizer.
 #include "tests/world/random_bodies.hpp"
 
+#include <functional>
+#include <stdexcept>
 #include <thread>
+#include <utility>
+#include <vector>
 
 namespace jfpx {
 inline namespace JFPX_ABI {
@@ -122,6 +126,49 @@ TEST(SoftStepConcurrency, AHeapOfThousandsStepsOnSeveralThreads) {
     EXPECT_GT(world.contacts().size(), 20000u);
     if (threads == 1) expected = world.state_hash();
     EXPECT_EQ(world.state_hash(), expected);
+  }
+}
+
+/// Each step runs in a thread of its own, beside two that run its tasks.
+TEST_P(Concurrency, TasksOfTheProgramTakePartInStepsWithTheSameBits) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = dense_scene(seed);
+  World expected(scene);
+  std::vector<std::function<void()>> late;
+  {
+    std::vector<std::jthread> tasks;
+    World world(scene, {.threads = 3, .enqueue_task = [&](std::function<void()> task) {
+                          late.push_back(task);  // a second call has no effect
+                          tasks.emplace_back(std::move(task));
+                        }});
+    for (int n = 0; n < 40; ++n) {
+      std::jthread([&] { world.step(); }).join();
+      expected.step();
+      EXPECT_EQ(tasks.size(), 2u * (static_cast<unsigned>(n) + 1));
+    }
+    EXPECT_EQ(world.state_hash(), expected.state_hash());
+  }
+  for (const auto& task : late) task();
+}
+
+TEST_P(Concurrency, AStepIsUndoneIfItCannotEnqueueTasks) {
+  const std::uint64_t seed = fresh_seed();
+  SCOPED_TRACE(trace(seed));
+  const Scene scene = dense_scene(seed);
+  bool is_full = false;
+  World expected(scene);
+  World world(scene, {.threads = 2, .enqueue_task = [&](const std::function<void()>&) {
+                        if (is_full) throw std::runtime_error("full");
+                      }});
+  for (int n = 0; n < 10; ++n) {
+    is_full = true;
+    EXPECT_THROW(world.step(), std::runtime_error);
+    is_full = false;
+    EXPECT_TRUE(world.states() == expected.states());
+    world.step();
+    expected.step();
+    EXPECT_EQ(world.state_hash(), expected.state_hash());
   }
 }
 
