@@ -107,8 +107,8 @@ JFPX_HD inline BodyState interpolate(const BodyState& before, const BodyState& a
 }
 
 /// The state with the velocities that take a kinematic body to a pose in one step, along the
-/// shorter arc: to be passed to World::set_state() before each step of a path, and once more at its
-/// end, because velocities remain until they are changed. The rotation is exact for 4 substeps. Its
+/// shorter arc: to be passed to World::set_state() before each step of a path. Velocities remain
+/// until they are changed, so set them to 0 at the end. The rotation is exact for 4 substeps. Its
 /// error for other numbers grows with the third power of the angle: less than a degree at 45
 /// degrees. The steps of a path do not drift, because each starts at the pose that was reached.
 /// @param orientation [-], unit

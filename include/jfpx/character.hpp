@@ -38,9 +38,10 @@ struct CharacterState {
   /// air: in the world.
   Vec3 velocity;
   GroundState ground_state = GroundState::air;
-  BodyId ground_body = {};    ///< the body below; invalid in the air
-  Vec3 ground_normal = {};    ///< [-], unit, of the surface below; zero in the air
-  Vec3 ground_velocity = {};  ///< [m/s], of the body below at the feet; zero in the air
+  BodyId ground_body = {};        ///< the body below; invalid in the air
+  Vec3 ground_normal = {};        ///< [-], unit, of the surface below; zero in the air
+  Vec3 ground_velocity = {};      ///< [m/s], of the body below at the feet; zero in the air
+  std::uint32_t ground_part = 0;  ///< of the body below, as in RayHit; 0 in the air
   friend bool operator==(const CharacterState&, const CharacterState&) = default;
 };
 
@@ -50,6 +51,7 @@ struct CharacterHit {
   Vec3 point;               ///< [m], world, of the surface of the body
   Vec3 normal;              ///< [-], unit, from the body to the character
   Real approach_speed = 0;  ///< [m/s], >= 0, of character and body along the normal, before the hit
+  std::uint32_t part = 0;   ///< of the body, as in RayHit
   friend bool operator==(const CharacterHit&, const CharacterHit&) = default;
 };
 

@@ -3,6 +3,7 @@
 
 #include <jfpx/body.hpp>
 
+#include <cstdint>
 #include <functional>
 #include <limits>
 
@@ -24,6 +25,9 @@ struct RayHit {
   Real distance = 0;  ///< [m], from the origin
   Vec3 point;         ///< [m], world
   Vec3 normal;        ///< [-], unit, outwards
+  /// Number of the part in Compound::parts, of the triangle in TriangleMesh::triangles() or, as in
+  /// HeightfieldDef, of the triangle of a heightfield; 0 for other shapes.
+  std::uint32_t part = 0;
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
 
@@ -41,10 +45,11 @@ struct ShapeCast {
 /// contact. In all other cases the distance is 0.
 struct ShapeHit {
   BodyId body;
-  Real fraction = 0;  ///< [-], of the translation, in [0, 1]
-  Vec3 point;         ///< [m], world
-  Vec3 normal;        ///< [-], unit, from the body to the solid
-  Real distance = 0;  ///< [m], <= 0: negative depth of an overlap at the start
+  Real fraction = 0;       ///< [-], of the translation, in [0, 1]
+  Vec3 point;              ///< [m], world
+  Vec3 normal;             ///< [-], unit, from the body to the solid
+  Real distance = 0;       ///< [m], <= 0: negative depth of an overlap at the start
+  std::uint32_t part = 0;  ///< of the body, as in RayHit
   friend bool operator==(const ShapeHit&, const ShapeHit&) = default;
 };
 
@@ -59,10 +64,11 @@ struct DistanceQuery {
 /// The closest points of a body and a solid, so that query_point = point + normal * distance.
 struct BodyDistance {
   BodyId body;
-  Real distance = 0;  ///< [m]; of an overlap < 0: negative depth
-  Vec3 point;         ///< [m], world, of the surface of the body
-  Vec3 query_point;   ///< [m], world, of the surface of the solid
-  Vec3 normal;        ///< [-], unit, from the body to the solid
+  Real distance = 0;       ///< [m]; of an overlap < 0: negative depth
+  Vec3 point;              ///< [m], world, of the surface of the body
+  Vec3 query_point;        ///< [m], world, of the surface of the solid
+  Vec3 normal;             ///< [-], unit, from the body to the solid
+  std::uint32_t part = 0;  ///< of the body, as in RayHit
   friend bool operator==(const BodyDistance&, const BodyDistance&) = default;
 };
 

@@ -115,6 +115,10 @@ struct HitEvent {
   /// [m], world, at the start of the step: the fastest point of the contact, as in Contact
   Vec3 point;
   Real approach_speed = 0;  ///< [m/s], > 0, of the point along the normal, at the start of the step
+  /// Of a and b: number of the part in Compound::parts, of the triangle in
+  /// TriangleMesh::triangles() or, as in HeightfieldDef, of the triangle of a heightfield; 0 for
+  /// other shapes.
+  std::uint32_t part_a = 0, part_b = 0;
   friend bool operator==(const HitEvent&, const HitEvent&) = default;
 };
 
@@ -128,6 +132,8 @@ struct ContactForce {
   /// [N m], world axes, on a in addition to that of the force: the point's share in the torque of
   /// rolling and spinning friction; b has the opposite torque
   Vec3 torque;
+  /// As in HitEvent; 0 for contacts of contact generators.
+  std::uint32_t part_a = 0, part_b = 0;
   friend bool operator==(const ContactForce&, const ContactForce&) = default;
 };
 

@@ -14,7 +14,7 @@ from ._contact_generators import ContactContext, DetectedContacts
 from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Error, FileError,
                       InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
-                      ForceContext, Gravity, Spring, States)
+                      ForceContext, Gravity, Spring, States, interpolate)
 from ._joints import (BallJoint, DistanceJoint, FixedJoint, HingeJoint, JointId, JointState,
                       SliderJoint, WheelJoint)
 from ._nearest import Nearest, PeriodicNearest, find_nearest
@@ -38,5 +38,5 @@ __all__ = [
     "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording", "RecordingWriter", "Rows", "STAY",
     "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring", "States", "StepReport",
     "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends", "available_gpus",
-    "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "scene_names",
+    "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "interpolate", "scene_names",
 ]

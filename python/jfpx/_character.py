@@ -53,6 +53,8 @@ class CharacterState(NamedTuple):
         Unit vector of the surface below; zero in the air.
     ground_velocity : three numbers
         [m/s], of the body below at the feet; zero in the air.
+    ground_part : int
+        Of the body below, as in RayHit; 0 in the air.
     """
 
     position: tuple[float, ...]
@@ -61,6 +63,7 @@ class CharacterState(NamedTuple):
     ground_body: BodyId | None = None
     ground_normal: tuple[float, ...] = (0.0, 0.0, 0.0)
     ground_velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+    ground_part: int = 0
 
 
 class CharacterHit(NamedTuple):
@@ -76,12 +79,15 @@ class CharacterHit(NamedTuple):
         Unit vector, from the body to the character.
     approach_speed : float
         [m/s], >= 0, of character and body along the normal, before the hit.
+    part : int
+        Of the body, as in RayHit.
     """
 
     body: BodyId
     point: tuple[float, ...]
     normal: tuple[float, ...]
     approach_speed: float
+    part: int
 
 
 class CharacterMove(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -74,6 +74,53 @@ class BodyState(NamedTuple):
     orientation: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
     angular_velocity: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+Motion = TypeVar("Motion", States, BodyState)
+
+
+def interpolate(before: Motion, after: Motion, t: float) -> Motion:
+    """State or states between two steps, for drawing: linear interpolation, of orientations
+    normalized and along the shorter arc. Draw `after` for bodies that set_state() has moved in
+    between.
+
+    Parameters
+    ----------
+    before, after : BodyState or States
+        Both of the same type, and States of the same bodies, in host memory.
+    t : float
+        0: `before`, 1: `after`.
+
+    Returns
+    -------
+    BodyState or States
+        The arrays of States are new.
+
+    Raises
+    ------
+    InvalidArgument
+        Different types, or arrays of different shapes.
+    """
+    if type(before) is not type(after) or not isinstance(after, (BodyState, States)):
+        raise InvalidArgument(f"before is a {type(before).__name__} and after a "
+                              f"{type(after).__name__}; both must be BodyState or both States")
+    parts = []
+    for name, a, b in zip(after._fields, before, after):
+        a, b = np.asarray(a), np.asarray(b)
+        if a.shape != b.shape:
+            raise InvalidArgument(f"{name} has the shape {a.shape} before and {b.shape} after")
+        least = np.float32 if isinstance(after, States) else np.float64
+        dtype = np.result_type(a, b, least)
+        a, b = a.astype(dtype), b.astype(dtype)
+        if name.startswith("orientation"):
+            b = np.where(np.sum(a * b, axis=-1, keepdims=True) < 0, -b, b)
+        mixed = a * dtype.type(1 - t) + b * dtype.type(t)
+        if name.startswith("orientation"):
+            mixed /= np.linalg.norm(mixed, axis=-1, keepdims=True)
+        parts.append(mixed)
+    if isinstance(after, States):
+        return States(*parts)
+    return BodyState(*(tuple(part.tolist()) for part in parts))
 
 
 Vector = Sequence[float]

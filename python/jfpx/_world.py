@@ -141,6 +141,8 @@ class ContactForces(NamedTuple):
         opposite force.
     torque : array (E, 3)
         [N m]: on a in addition to that of the force, of rolling and spinning friction.
+    parts : array (2, E) of int64
+        Of a and b, as in RayHit; 0 for contacts of contact generators.
     """
 
     pairs: np.ndarray
@@ -149,6 +151,7 @@ class ContactForces(NamedTuple):
     arm_b: np.ndarray
     force: np.ndarray
     torque: np.ndarray
+    parts: np.ndarray
 
 
 BEGIN, STAY, END = 0, 1, 2
@@ -170,12 +173,15 @@ class HitEvents(NamedTuple):
         The fastest points [m] at the start of the step, in the axes of the world.
     approach_speed : array (H,)
         [m/s], > 0, of these points along the normals, at the start of the step.
+    parts : array (2, H) of int64
+        Of a and b, as in RayHit.
     """
 
     pairs: np.ndarray
     normal: np.ndarray
     point: np.ndarray
     approach_speed: np.ndarray
+    parts: np.ndarray
 
 
 class ContactEvents(NamedTuple):
@@ -220,12 +226,16 @@ class RayHit(NamedTuple):
         [m], in the axes of the world.
     normal : three numbers
         Unit vector, outwards.
+    part : int
+        Number of the part in the "parts" of a compound, of the triangle of a mesh, or of the
+        triangle of a heightfield, as in HeightfieldDef; 0 for other shapes.
     """
 
     body: BodyId
     distance: float
     point: tuple[float, ...]
     normal: tuple[float, ...]
+    part: int
 
 
 class RayHits(NamedTuple):
@@ -241,12 +251,15 @@ class RayHits(NamedTuple):
         [m]; zero: no hit.
     normal : array (R, 3)
         Unit vectors, outwards; zero: no hit.
+    part : array (R,) of int64
+        As in RayHit; 0 also where `bodies` is -1.
     """
 
     bodies: np.ndarray
     distance: np.ndarray
     point: np.ndarray
     normal: np.ndarray
+    part: np.ndarray
 
 
 class ShapeHit(NamedTuple):
@@ -265,6 +278,8 @@ class ShapeHit(NamedTuple):
         Unit vector, from the body to the solid.
     distance : float
         [m], <= 0: negative depth of an overlap at the start; otherwise 0.
+    part : int
+        Of the body, as in RayHit.
     """
 
     body: BodyId
@@ -272,6 +287,7 @@ class ShapeHit(NamedTuple):
     point: tuple[float, ...]
     normal: tuple[float, ...]
     distance: float
+    part: int
 
 
 class ShapeHits(NamedTuple):
@@ -289,6 +305,8 @@ class ShapeHits(NamedTuple):
         Unit vectors, from the body to the solid; zero: no hit.
     distance : array (C,)
         [m], <= 0: negative depth of an overlap at the start; otherwise 0.
+    part : array (C,) of int64
+        As in RayHit; 0 also where `bodies` is -1.
     """
 
     bodies: np.ndarray
@@ -296,6 +314,7 @@ class ShapeHits(NamedTuple):
     point: np.ndarray
     normal: np.ndarray
     distance: np.ndarray
+    part: np.ndarray
 
 
 class BodyDistance(NamedTuple):
@@ -313,6 +332,8 @@ class BodyDistance(NamedTuple):
         [m], of the surface of the solid, or the point.
     normal : three numbers
         Unit vector, from the body to the solid.
+    part : int
+        Of the body, as in RayHit.
     """
 
     body: BodyId
@@ -320,6 +341,7 @@ class BodyDistance(NamedTuple):
     point: tuple[float, ...]
     query_point: tuple[float, ...]
     normal: tuple[float, ...]
+    part: int
 
 
 class BodyDistances(NamedTuple):
@@ -337,6 +359,8 @@ class BodyDistances(NamedTuple):
         [m], of the surfaces of the solids; zero: no body.
     normal : array (Q, 3)
         Unit vectors, from the body to the solid; zero: no body.
+    part : array (Q,) of int64
+        As in RayHit; 0 also where `bodies` is -1.
     """
 
     bodies: np.ndarray
@@ -344,6 +368,7 @@ class BodyDistances(NamedTuple):
     point: np.ndarray
     query_point: np.ndarray
     normal: np.ndarray
+    part: np.ndarray
 
 
 class DebugLines(NamedTuple):
@@ -827,6 +852,33 @@ class World:
                              _arrays.triple(state.velocity, "velocity"),
                              _arrays.triple(state.angular_velocity, "angular_velocity"))
 
+    def moving_to(self, body: BodyId, position: Vector,
+                  orientation: Sequence[float] | None = None) -> BodyState:
+        """The state of a body with the velocities that take it to a pose in one step, along the
+        shorter arc: to be passed to set_state() before each step of the path of a kinematic body.
+        Velocities remain until they are changed, so set them to 0 at the end of the path.
+
+        Parameters
+        ----------
+        body : BodyId
+        position : three numbers
+            [m], each in [-1e9, 1e9].
+        orientation : four numbers, optional
+            Unit quaternion (w, x, y, z), to a thousandth of the squared length; None: the
+            orientation does not change.
+
+        Raises
+        ------
+        InvalidArgument
+            An unknown body, or a value out of its range.
+        DeviceError
+        """
+        if orientation is None:
+            orientation = self.state(body).orientation
+        return BodyState(*self._core.moving_to(_arrays.body(body),
+                                               _arrays.triple(position, "position"),
+                                               _arrays.triple(orientation, "orientation", 4)))
+
     def awake(self, body: BodyId) -> bool:
         """Whether a body is awake. A body of mass 0 is awake only if it is kinematic and moves.
         Raises InvalidArgument for an unknown body, DeviceError."""
@@ -1119,7 +1171,7 @@ class World:
         infinite. Raises OutOfMemory, DeviceError."""
         size = self._core.hit_count()
         result = HitEvents(np.empty((2, size), np.int64), self._rows(size), self._rows(size),
-                           self._values(size))
+                           self._values(size), np.empty((2, size), np.int64))
         self._core.write_hits(*result)
         return result
 
@@ -1130,7 +1182,8 @@ class World:
         DeviceError."""
         size = self._core.force_count()
         result = ContactForces(np.empty((2, size), np.int64), self._rows(size), self._rows(size),
-                               self._rows(size), self._rows(size), self._rows(size))
+                               self._rows(size), self._rows(size), self._rows(size),
+                               np.empty((2, size), np.int64))
         self._core.write_forces(*result)
         return result
 
@@ -1198,7 +1251,7 @@ class World:
         if directions.shape[0] != size:
             raise InvalidArgument(f"directions has {directions.shape[0]} rows; origins has {size}")
         result = RayHits(np.empty(size, np.int64), self._values(size), self._rows(size),
-                         self._rows(size))
+                         self._rows(size), np.empty(size, np.int64))
         limits = _arrays.vector(_arrays.converted(max_distances, "max_distances", self._dtype),
                                 "max_distances", size, self._dtype)
         self._core.cast_rays(origins, directions, limits, *result)
@@ -1281,7 +1334,7 @@ class World:
                 f"translations has {translations.shape[0]} rows; positions has {size}")
         turned = self._orientations(orientations, size)
         result = ShapeHits(np.empty(size, np.int64), self._values(size), self._rows(size),
-                           self._rows(size), self._values(size))
+                           self._rows(size), self._values(size), np.empty(size, np.int64))
         self._core.cast_shapes(self._solid(shape), positions, translations, turned, *result)
         return result
 
@@ -1367,7 +1420,7 @@ class World:
         limits = _arrays.vector(_arrays.converted(max_distances, "max_distances", self._dtype),
                                 "max_distances", size, self._dtype)
         result = BodyDistances(np.empty(size, np.int64), self._values(size), self._rows(size),
-                               self._rows(size), self._rows(size))
+                               self._rows(size), self._rows(size), np.empty(size, np.int64))
         self._core.closest_bodies(self._solid_or_point(shape), positions, turned, limits, *result)
         return result
 
@@ -1407,10 +1460,10 @@ class World:
             _arrays.triple(state.velocity, "velocity"), _GROUND_STATES.index(state.ground),
             state.ground_body, _arrays.triple(state.ground_normal, "ground_normal"),
             _arrays.number(dt, "dt"), _of_body(filter))
-        position, velocity, ground, body, normal, ground_velocity = values
+        position, velocity, ground, body, *others = values
         return CharacterMove(
             CharacterState(position, velocity, _GROUND_STATES[ground],
-                           None if body is None else BodyId(*body), normal, ground_velocity),
+                           None if body is None else BodyId(*body), *others),
             [CharacterHit(BodyId(*hit[0]), *hit[1:]) for hit in hits])
 
     def overlapping(self, shape: dict[str, Any], position: Vector,

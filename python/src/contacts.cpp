@@ -37,7 +37,8 @@ void write_contacts(const PythonWorld& self, const Rows<std::int64_t>& pairs,
 
 void write_forces(const PythonWorld& self, const Rows<std::int64_t>& pairs,
                   const Rows<Real>& normals, const Rows<Real>& arms_a, const Rows<Real>& arms_b,
-                  const Rows<Real>& forces, const Rows<Real>& torques) {
+                  const Rows<Real>& forces, const Rows<Real>& torques,
+                  const Rows<std::int64_t>& parts) {
   const std::span<const ContactForce> all = self.get().contact_forces();
   if (normals.shape(0) != all.size()) throw ConcurrentUse(UseGuard::message("world"));
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -49,6 +50,8 @@ void write_forces(const PythonWorld& self, const Rows<std::int64_t>& pairs,
     set_row(arms_b, i, f.arm_b);
     set_row(forces, i, f.force);
     set_row(torques, i, f.torque);
+    parts(0, i) = f.part_a;
+    parts(1, i) = f.part_b;
   }
 }
 
@@ -71,7 +74,8 @@ void write_events(const PythonWorld& self, const Vector<std::int64_t>& phases,
 }
 
 void write_hits(const PythonWorld& self, const Rows<std::int64_t>& pairs, const Rows<Real>& normals,
-                const Rows<Real>& points, const Vector<Real>& speeds) {
+                const Rows<Real>& points, const Vector<Real>& speeds,
+                const Rows<std::int64_t>& parts) {
   const std::span<const HitEvent> hits = self.get().hit_events();
   require_size(speeds, hits.size());
   for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -80,6 +84,8 @@ void write_hits(const PythonWorld& self, const Rows<std::int64_t>& pairs, const 
     set_row(normals, i, hits[i].normal);
     set_row(points, i, hits[i].point);
     speeds(i) = hits[i].approach_speed;
+    parts(0, i) = hits[i].part_a;
+    parts(1, i) = hits[i].part_b;
   }
 }
 
@@ -91,7 +97,7 @@ Ray to_ray(const Triple& origin, const Triple& direction, double max_distance) {
 
 nb::tuple to_python(const RayHit& hit) {
   return nb::make_tuple(to_tuple(hit.body), static_cast<double>(hit.distance), to_triple(hit.point),
-                        to_triple(hit.normal));
+                        to_triple(hit.normal), hit.part);
 }
 
 /// The shape of the only body of a scene.
@@ -116,15 +122,15 @@ ShapeCast to_cast(const Scene& shape, const Triple& position, const Triple& tran
 
 nb::tuple to_python(const ShapeHit& hit) {
   return nb::make_tuple(to_tuple(hit.body), static_cast<double>(hit.fraction), to_triple(hit.point),
-                        to_triple(hit.normal), static_cast<double>(hit.distance));
+                        to_triple(hit.normal), static_cast<double>(hit.distance), hit.part);
 }
 
 /// The first hit of each cast of a solid; -1 for the body of a cast without a hit.
 void cast_shapes(const PythonWorld& self, const Scene& shape, const Rows<const Real>& positions,
                  const Rows<const Real>& translations, const Rows<const Real>& orientations,
                  const Vector<std::int64_t>& bodies, const Vector<Real>& fractions,
-                 const Rows<Real>& points, const Rows<Real>& normals,
-                 const Vector<Real>& distances) {
+                 const Rows<Real>& points, const Rows<Real>& normals, const Vector<Real>& distances,
+                 const Vector<std::int64_t>& parts) {
   const World& world = self.get();
   ShapeCast cast{to_solid_shape(shape), {}, {}, {}};
   for (std::size_t i = 0; i < bodies.shape(0); ++i) {
@@ -145,6 +151,7 @@ void cast_shapes(const PythonWorld& self, const Scene& shape, const Rows<const R
     set_row(points, i, values.point);
     set_row(normals, i, values.normal);
     distances(i) = values.distance;
+    parts(i) = values.part;
   }
 }
 
@@ -158,7 +165,7 @@ DistanceQuery to_query(const Scene* shape, const Triple& position, const Quadrup
 nb::tuple to_python(const BodyDistance& found) {
   return nb::make_tuple(to_tuple(found.body), static_cast<double>(found.distance),
                         to_triple(found.point), to_triple(found.query_point),
-                        to_triple(found.normal));
+                        to_triple(found.normal), found.part);
 }
 
 /// The closest body of each position; -1 if there is none.
@@ -166,7 +173,7 @@ void closest_bodies(const PythonWorld& self, const Scene* shape, const Rows<cons
                     const Rows<const Real>& orientations, const Vector<const Real>& max_distances,
                     const Vector<std::int64_t>& bodies, const Vector<Real>& distances,
                     const Rows<Real>& points, const Rows<Real>& query_points,
-                    const Rows<Real>& normals) {
+                    const Rows<Real>& normals, const Vector<std::int64_t>& parts) {
   const World& world = self.get();
   DistanceQuery query;
   if (shape != nullptr) query.shape = to_solid_shape(*shape);
@@ -188,6 +195,7 @@ void closest_bodies(const PythonWorld& self, const Scene* shape, const Rows<cons
     set_row(points, i, values.point);
     set_row(query_points, i, values.query_point);
     set_row(normals, i, values.normal);
+    parts(i) = values.part;
   }
 }
 
@@ -195,7 +203,8 @@ void closest_bodies(const PythonWorld& self, const Scene* shape, const Rows<cons
 void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
                const Rows<const Real>& directions, const Vector<const Real>& max_distances,
                const Vector<std::int64_t>& bodies, const Vector<Real>& distances,
-               const Rows<Real>& points, const Rows<Real>& normals) {
+               const Rows<Real>& points, const Rows<Real>& normals,
+               const Vector<std::int64_t>& parts) {
   const World& world = self.get();
   for (std::size_t i = 0; i < bodies.shape(0); ++i) {
     const std::size_t limit = max_distances.shape(0) == 1 ? 0 : i;
@@ -212,6 +221,7 @@ void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
     distances(i) = hit ? values.distance : std::numeric_limits<Real>::infinity();
     set_row(points, i, values.point);
     set_row(normals, i, values.normal);
+    parts(i) = values.part;
   }
 }
 
@@ -238,14 +248,14 @@ nb::tuple move_one(const PythonWorld& self, const std::array<double, 5>& numbers
   nb::list hits;
   for (const CharacterHit& hit : move.hits) {
     hits.append(nb::make_tuple(to_tuple(hit.body), to_triple(hit.point), to_triple(hit.normal),
-                               static_cast<double>(hit.approach_speed)));
+                               static_cast<double>(hit.approach_speed), hit.part));
   }
   const CharacterState& s = move.state;
   std::optional<IdTuple> below;
   if (s.ground_state != GroundState::air) below = to_tuple(s.ground_body);
   return nb::make_tuple(to_triple(s.position), to_triple(s.velocity),
                         static_cast<int>(s.ground_state), below, to_triple(s.ground_normal),
-                        to_triple(s.ground_velocity), hits);
+                        to_triple(s.ground_velocity), s.ground_part, hits);
 }
 
 std::vector<IdTuple> to_tuples(const std::vector<BodyId>& ids) {
@@ -324,7 +334,8 @@ void bind_contacts(nb::class_<PythonWorld>& world) {
           nb::arg("filter").none())
       .def("closest_bodies", &closest_bodies, nb::arg("shape").none(), nb::arg("positions"),
            nb::arg("orientations"), nb::arg("max_distances"), nb::arg("bodies"),
-           nb::arg("distances"), nb::arg("points"), nb::arg("query_points"), nb::arg("normals"))
+           nb::arg("distances"), nb::arg("points"), nb::arg("query_points"), nb::arg("normals"),
+           nb::arg("parts"))
       .def(
           "closest_body",
           [](const PythonWorld& self, const Scene* shape, Triple position, Quadruple orientation,

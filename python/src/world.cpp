@@ -104,6 +104,18 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
              return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation),
                                    to_triple(s.velocity), to_triple(s.angular_velocity));
            })
+      .def("moving_to",
+           [](const PythonWorld& self, IdTuple id, Triple position, Quadruple orientation) {
+             const World& of = self.get();
+             const BodyState goal{to_vec3(position), to_quat(orientation), {}, {}};
+             if (const std::string fault = find_fault(goal); !fault.empty()) {
+               throw InvalidArgument("the goal has a " + fault);
+             }
+             const BodyState s = moving_to(of.state(to_id(id)), goal.position,
+                                           normalized(goal.orientation), of.settings().dt);
+             return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation),
+                                   to_triple(s.velocity), to_triple(s.angular_velocity));
+           })
       .def("set_state",
            [](PythonWorld& self, IdTuple id, Triple position, Quadruple orientation,
               Triple velocity, Triple angular_velocity) {

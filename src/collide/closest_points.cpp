@@ -162,7 +162,6 @@ ClosestPair find_closest(const MeshView& mesh, const Transform& mesh_pose, const
   const Vec3 centre = from + rotation * solid.core.centre;
   ClosestPair closest;
   Vec3 origin;
-  std::uint32_t number = 0;
   const auto visit = [&](std::uint32_t triangle) {
     Vec3 corner[3];
     mesh.get_corners(triangle, corner);
@@ -172,11 +171,12 @@ ClosestPair find_closest(const MeshView& mesh, const Transform& mesh_pose, const
     ClosestPair pair =
         find_closest(make_core(corner, normal), solid.core, rotation, from - start, limit);
     pair.distance = std::max(pair.distance, Real(0));
-    const bool is_first = !closest.found || pair.distance < closest.distance || triangle < number;
+    pair.part = triangle;
+    const bool is_first =
+        !closest.found || pair.distance < closest.distance || triangle < closest.part;
     if (pair.found && is_first) {
       closest = pair;
       origin = start;
-      number = triangle;
       limit = pair.distance;
     }
     return limit;

@@ -13,9 +13,10 @@ struct ClosestPair {
   /// Whether the cores overlap or touch. Moving the solid by -distance along the normal then ends
   /// the overlap, but it may be that a shorter motion along another axis does, too.
   bool is_inside = false;
-  Real distance = 0;  ///< [m]; of an overlap < 0: negative depth
-  Vec3 point;         ///< [m], of the target
-  Vec3 normal;        ///< unit, from the target to the solid
+  Real distance = 0;       ///< [m]; of an overlap < 0: negative depth
+  Vec3 point;              ///< [m], of the target
+  Vec3 normal;             ///< unit, from the target to the solid
+  std::uint32_t part = 0;  ///< as in BodyDistance
 };
 
 /// The closest points of two convex shapes, in the axes of the target.

@@ -234,22 +234,21 @@ inline RayEntry enter(const Vec3& origin, const Vec3& direction, const Mesh auto
   const Vec3 along = inverse_transform_direction(pose, direction);
   const MeshRay ray(from, along);
   RayEntry first;
-  std::uint32_t triangle = 0;
   visit_triangles_along(view, from, along, max_distance, [&](std::uint32_t index) {
     const Real distance = ray.hit(view, index);
     const bool is_hit = distance >= 0 && distance <= max_distance;
     if (is_hit && (!first.hit || distance < first.distance ||
-                   (distance == first.distance && index < triangle))) {
+                   (distance == first.distance && index < first.part))) {
       first.hit = true;
       first.distance = distance;
-      triangle = index;
+      first.part = index;
     }
     return first.hit ? first.distance : max_distance;
   });
   if (!first.hit) return first;
   Vec3 corners[3];
-  view.get_corners(triangle, corners);
-  const Vec3 normal = view.normal(triangle, corners);
+  view.get_corners(first.part, corners);
+  const Vec3 normal = view.normal(first.part, corners);
   first.normal = pose.basis * (dot(normal, along) > 0 ? -normal : normal);
   return first;
 }

@@ -3,6 +3,8 @@
 
 #include <jfpx/math.hpp>
 
+#include <cstdint>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace detail {
@@ -10,8 +12,9 @@ namespace detail {
 /// The point where a ray enters a solid. Without a hit the other fields are 0.
 struct RayEntry {
   bool hit = false;
-  Real distance = 0;  ///< [m], >= 0
-  Vec3 normal;        ///< unit, outwards; opposite to a ray that starts inside
+  Real distance = 0;       ///< [m], >= 0
+  Vec3 normal;             ///< unit, outwards; opposite to a ray that starts inside
+  std::uint32_t part = 0;  ///< as in RayHit
 };
 
 }  // namespace detail

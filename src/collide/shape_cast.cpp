@@ -95,7 +95,7 @@ CastEntry cast(const HalfSpace& target, const ConvexCore& moving, const Transfor
   const Real fraction = distance / motion.length;
   if (!(fraction <= motion.limit)) return {};
   const Vec3 point = add_scaled(lowest, n, -moving.radius);
-  return {true, false, fraction, add_scaled(point, motion.direction, distance), n};
+  return {true, false, fraction, add_scaled(point, motion.direction, distance), n, 0};
 }
 
 CastEntry cast(const MeshView& mesh, const Transform& mesh_pose, const ConvexCore& moving,
@@ -107,7 +107,6 @@ CastEntry cast(const MeshView& mesh, const Transform& mesh_pose, const ConvexCor
   local.direction = inverse_transform_direction(mesh_pose, motion.direction);
   CastEntry first;
   Vec3 origin;
-  std::uint32_t number = 0;
   const auto visit = [&](std::uint32_t triangle) {
     Vec3 corner[3];
     mesh.get_corners(triangle, corner);
@@ -115,13 +114,12 @@ CastEntry cast(const MeshView& mesh, const Transform& mesh_pose, const ConvexCor
     for (Vec3& p : corner) p -= start;
     const bool is_behind = dot(normal, centre - start) < 0;
     if (mesh.two_sided != 0 || !is_behind) {
-      const CastEntry entry =
-          cast(make_core(corner, normal), moving, rotation, from - start, local);
-      const bool is_first = !first.hit || entry.fraction < first.fraction || triangle < number;
+      CastEntry entry = cast(make_core(corner, normal), moving, rotation, from - start, local);
+      entry.part = triangle;
+      const bool is_first = !first.hit || entry.fraction < first.fraction || triangle < first.part;
       if (entry.hit && !entry.is_inside && is_first) {
         first = entry;
         origin = start;
-        number = triangle;
         local.limit = entry.fraction;
       }
     }

@@ -20,9 +20,10 @@ struct CastEntry {
   /// Whether the cores overlap at the start, by more than the rounding errors. The normal is then
   /// an axis along which they overlap little, and the fraction is 0.
   bool is_inside = false;
-  Real fraction = 0;  ///< [-], of the motion, in [0, 1]
-  Vec3 point;         ///< [m]
-  Vec3 normal;        ///< unit, from the target to the moving shape
+  Real fraction = 0;       ///< [-], of the motion, in [0, 1]
+  Vec3 point;              ///< [m]
+  Vec3 normal;             ///< unit, from the target to the moving shape
+  std::uint32_t part = 0;  ///< as in ShapeHit
 };
 
 /// Casts a shape to a target, in the axes of the target. A shape that touches the target at the

@@ -56,10 +56,14 @@ detail::RayEntry enter(const Ray& ray, const S& shape, const Transform& pose) {
 /// The first entry of a ray into a body. Among parts at the same distance, the first part is hit.
 detail::RayEntry enter(const Ray& ray, const BodyStore& bodies, std::uint32_t body) {
   detail::RayEntry first;
-  for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
-    const detail::RayEntry entry = enter(ray, shape, pose);
-    if (entry.hit && (!first.hit || entry.distance < first.distance)) first = entry;
-  });
+  for_each_posed_sub_shape(bodies, body,
+                           [&](const auto& shape, const Transform& pose, std::uint32_t part) {
+                             const detail::RayEntry entry = enter(ray, shape, pose);
+                             if (!entry.hit || (first.hit && !(entry.distance < first.distance)))
+                               return;
+                             first = entry;
+                             first.part += part;  // one of both is 0
+                           });
   return first;
 }
 
@@ -70,7 +74,7 @@ std::optional<RayHit> hit_of(const Ray& ray, const BodyStore& bodies, std::uint3
   const Vec3 point = add_scaled(ray.origin, ray.direction, entry.distance);
   // A ray nearly parallel to a wall may intersect it at a distance beyond the range of Real.
   if (!is_finite(point)) return std::nullopt;
-  return RayHit{bodies.id(body), entry.distance, point, entry.normal};
+  return RayHit{bodies.id(body), entry.distance, point, entry.normal, entry.part};
 }
 
 /// Order of the hits of a ray. No two hits are equal.

@@ -388,6 +388,83 @@ def test_hit_events_have_the_speed_before_the_step(dtype):
     assert sum(len(silent.hit_events().point) for _ in range(200) if silent.step()) == 0
 
 
+def test_hits_have_the_numbers_of_parts_and_triangles(dtype):
+    balls = [{"shape": {"type": "sphere", "radius": 0.4}, "position": [x, 0, 0]} for x in (-1, 0, 1)]
+    mesh = {"type": "triangle_mesh", "vertices": [[-9, -1, -9], [9, -1, -9], [-9, -1, 9], [9, -1, 9]],
+            "triangles": [[1, 2, 3], [0, 2, 1]]}
+    world = jfpx.World({"bodies": [{"shape": mesh, "mass": 0},
+                                   {"shape": {"type": "compound", "parts": balls}}]},
+                       dtype=dtype, hit_speed=0.5)
+    above, down = np.array([[-1, 3, 0], [0, 3, 0], [1, 3, 0], [-5, 3, -5], [5, 3, 5]]), (0, -9, 0)
+    expected = [0, 1, 2, 1, 0]
+    downs = np.broadcast_to(down, above.shape)
+    ball = {"type": "sphere", "radius": 0.05}
+    assert world.cast_rays(above, downs).part.tolist() == expected
+    assert world.cast_shapes(ball, above, downs).part.tolist() == expected
+    assert world.closest_bodies(above - [0, 2.5, 0], ball).part.tolist() == expected
+    for at, part in zip(above.tolist(), expected):
+        assert world.cast_ray(at, down).part == part
+        assert world.cast_shape(ball, at, down).part == part
+        assert world.closest_body((at[0], at[1] - 2.5, at[2]), ball).part == part
+    hits = []
+    while not hits:
+        world.step()
+        assert world.report.step < 100
+        hits = world.hit_events().parts.T.tolist()
+    assert len(hits) == 1 and hits[0][0] in (0, 1) and hits[0][1] in (0, 1, 2)
+    world.run(60)
+    parts = world.contact_forces().parts
+    assert parts.shape[0] == 2 and len(set(map(tuple, parts.T.tolist()))) == parts.shape[1] >= 3
+
+
+def test_states_between_two_steps_are_interpolated(dtype):
+    turned = {**BALL, "position": [4, 0, 0], "angular_velocity": [0, 3, 0], "velocity": [1, 0, 0]}
+    world = jfpx.World({"bodies": [BALL, turned]}, dtype=dtype)
+    before = world.states()
+    world.run(10)
+    after = world.states()
+    for t in (0, 0.25, 1):
+        between = jfpx.interpolate(before, after, t)
+        assert all(array.dtype == dtype for array in between)
+        np.testing.assert_allclose(between.positions,
+                                   before.positions * (1 - t) + after.positions * t, rtol=1e-6)
+        np.testing.assert_allclose(np.linalg.norm(between.orientations, axis=1), 1, rtol=1e-6)
+        opposite = after._replace(orientations=-after.orientations)
+        same = jfpx.interpolate(before, opposite, t).orientations
+        np.testing.assert_allclose(np.abs(np.sum(same * between.orientations, axis=1)), 1, rtol=1e-6)
+    half = jfpx.interpolate(*(jfpx.BodyState(*(a[1].tolist() for a in s)) for s in (before, after)), 0.5)
+    angle = 2 * np.arctan2(half.orientation[2], half.orientation[0])
+    assert isinstance(half.position, tuple) and angle == pytest.approx(0.5 * 3 * 10 / 60, rel=1e-3)
+    whole = jfpx.interpolate(jfpx.BodyState((0, 0, 0), (1, 0, 0, 0)), jfpx.BodyState((4, 0, 0)), 0.5)
+    assert whole.position == (2, 0, 0) and whole.orientation == (1, 0, 0, 0)
+    shorter = jfpx.States(*(array[:1] for array in after))
+    for wrong in ((before, shorter), (before, half), (tuple(before), tuple(after)), (half, 3)):
+        with pytest.raises(jfpx.InvalidArgument):
+            jfpx.interpolate(*wrong, 0.5)
+
+
+def test_a_kinematic_body_moves_to_a_pose_in_one_step(dtype):
+    lift = {"shape": {"type": "box", "half_extents": [1, 1, 1]}, "mass": 0, "kinematic": True}
+    world = jfpx.World({"bodies": [lift]}, dtype=dtype)
+    body = world.bodies[0]
+    for position, turn in (((1, 0, 0), 0.3), ((1, 2, 0), -0.2), ((0, 2, 0), None)):
+        goal = None if turn is None else (np.cos(turn / 2), 0, np.sin(turn / 2), 0)
+        expected = world.state(body).orientation if goal is None else goal
+        world.set_state(body, world.moving_to(body, position, goal))
+        world.step()
+        assert world.state(body).position == pytest.approx(position, abs=1e-5)
+        assert world.state(body).orientation == pytest.approx(expected, abs=1e-5)
+    world.set_state(body, world.state(body)._replace(velocity=(0, 0, 0), angular_velocity=(0, 0, 0)))
+    world.step()
+    assert not world.awake(body)
+    for wrong, message in ((lambda: world.moving_to(7, (0, 0, 0)), "body is 7"),
+                           (lambda: world.moving_to(body, (0, 0)), "position"),
+                           (lambda: world.moving_to(body, (0, 0, np.nan)), "position"),
+                           (lambda: world.moving_to(body, (0, 0, 0), (0, 0, 0, 0)), "orientation")):
+        with pytest.raises(jfpx.InvalidArgument, match=message):
+            wrong()
+
+
 def test_rays_agree_with_the_formula_of_a_sphere(rng, dtype):
     centres = (rng.random((40, 3)) * 10).astype(dtype)
     scene = jfpx.Scene(dtype=dtype)

@@ -123,6 +123,28 @@ TEST(Character, FallsOntoEachFloor) {
   }
 }
 
+TEST(Character, HasTheTriangleOfTheGroundAndOfAHit) {
+  const TriangleMesh mesh({{-9, 0, -9}, {-9, 0, 9}, {2, 0, -9}, {2, 0, 9}, {2, 9, -9}, {2, 9, 9}},
+                          {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}, {4, 3, 5}});
+  const World world = query_world({fixed_body(mesh)});
+  Player player({-4, 0, 2});
+  std::uint32_t walls = 0;
+  for (int n = 0; n < 240; ++n) {
+    player.walk(world, 3, 0);
+    if (!player.stands()) continue;
+    const auto ground = world.cast_ray({.origin = player.state.position, .direction = {0, -1, 0}});
+    ASSERT_TRUE(ground.has_value());
+    EXPECT_EQ(player.state.ground_part, ground->part) << n;
+    for (const CharacterHit& hit : player.hits) {
+      if (hit.normal.y > 0.5_r) continue;  // it lands
+      EXPECT_LT(hit.normal.x, -0.9_r);
+      EXPECT_EQ(hit.part, 2u);
+      ++walls;
+    }
+  }
+  EXPECT_GT(walls, 20u);
+}
+
 TEST(Character, SlidesAlongAWall) {
   const World world = query_world({test::ground(), fixed_body(Box{{1, 5, 50}}, {3, 5, 0})});
   Player player({0, 0, 0});

@@ -56,6 +56,40 @@ TEST(HitEvents, OfABallThatFallsHaveItsSpeedUntilItRests) {
   }
 }
 
+/// Two balls as one body fall on a mesh: the left one on its second triangle, deeper than the right
+/// one, which is higher.
+TEST(HitEvents, AndContactForcesHaveTheNumbersOfPartsAndTriangles) {
+  Scene scene;
+  BodyDef floor;
+  floor.mass = 0;
+  floor.shape = TriangleMesh({{-9, 0, -9}, {9, 0, -9}, {-9, 0, 9}, {9, 0, 9}},
+                             {Triangle{1, 2, 3}, Triangle{0, 2, 1}});
+  BodyDef pair;
+  pair.shape = Compound{{{Sphere{0.5_r}, {1, 0, 0}, {}, 1}, {Sphere{0.5_r}, {-1, 0, 0}, {}, 1}}};
+  pair.position = {-3, 1, -3};
+  pair.orientation = normalized(Quat{1, 0, 0, 0.1_r});
+  for (const bool swaps : {false, true}) {
+    scene.bodies = swaps ? std::vector{pair, floor} : std::vector{floor, pair};
+    World world(scene, {.hit_speed = 0.5_r});
+    while (world.hit_events().empty()) {
+      world.step();
+      ASSERT_LT(world.steps(), 100u);
+    }
+    ASSERT_EQ(world.hit_events().size(), 1u);
+    const HitEvent& hit = world.hit_events()[0];
+    EXPECT_EQ(hit.part_a, 1u);  // the triangle and the ball both have number 1
+    EXPECT_EQ(hit.part_b, 1u);
+    for (int n = 0; n < 120; ++n) world.step();  // both balls rest
+    ASSERT_EQ(world.contact_forces().size(), 2u);
+    for (const ContactForce& force : world.contact_forces()) {
+      const bool a_falls = world.mass(force.a) > 0;
+      EXPECT_EQ(a_falls ? force.part_b : force.part_a, 1u);
+      const Real arm = (a_falls ? force.arm_a : force.arm_b).x;
+      EXPECT_EQ(a_falls ? force.part_a : force.part_b, arm > 0 ? 0u : 1u);
+    }
+  }
+}
+
 TEST(HitEvents, AreNoneWithoutAHitSpeed) {
   World world = falling_ball(0.5_r, {});
   for (int n = 0; n < 200; ++n) {

@@ -86,12 +86,13 @@ class LinearQueries {
     const auto visit_parts = [&](const auto& shape) {
       if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, Compound>) {
         const Transform pose = make_transform(body.orientation, body.position);
-        for (const CompoundPart& part : shape.parts) {
+        for (std::uint32_t i = 0; i < shape.parts.size(); ++i) {
+          const CompoundPart& part = shape.parts[i];
           const Transform local = make_transform(part.orientation, part.position);
-          std::visit([&](const auto& s) { visit(s, pose * local); }, part.shape);
+          std::visit([&](const auto& s) { visit(s, pose * local, i); }, part.shape);
         }
       } else {
-        visit(shape, make_transform(body.orientation, body.position));
+        visit(shape, make_transform(body.orientation, body.position), 0u);
       }
     };
     std::visit(visit_parts, *body.shape);
@@ -122,7 +123,7 @@ class LinearQueries {
       Vec3 corners[3];
       mesh.get_corners(i, corners);
       const Vec3 n = mesh.normal(i, corners);
-      first = {true, distance, pose.basis * (dot(n, along) > 0 ? -n : n)};
+      first = {true, distance, pose.basis * (dot(n, along) > 0 ? -n : n), i};
     }
     return first;
   }
@@ -140,18 +141,20 @@ class LinearQueries {
     const Ray ray{given.origin, unit_direction(given.direction), given.max_distance};
     for (const Body& body : bodies_) {
       detail::RayEntry first;
-      for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
-        const detail::RayEntry entry = enter(ray, shape, pose);
+      for_each_sub_shape(body, [&](const auto& shape, const Transform& pose, std::uint32_t part) {
+        detail::RayEntry entry = enter(ray, shape, pose);
+        entry.part += part;
         if (entry.hit && (!first.hit || entry.distance < first.distance)) first = entry;
       });
       if (!first.hit || first.distance > ray.max_distance) continue;
       const Vec3 point = add_scaled(ray.origin, ray.direction, first.distance);
       if (!is_finite(point) || (filter && !filter(body.id))) continue;
-      found(RayHit{body.id, first.distance, point, first.normal});
+      found(RayHit{body.id, first.distance, point, first.normal, first.part});
     }
   }
 
-  /// Calls visit(normal, point, distance) for the points where a solid touches a sub-shape.
+  /// Calls visit(normal, point, distance, triangle) for the points where a solid touches a
+  /// sub-shape.
   template <class S, class Visit>
   static void visit_touches(const SolidShape& solid, const Transform& at, const S& shape,
                             const Transform& pose, const Visit& visit) {
@@ -171,14 +174,14 @@ class LinearQueries {
             },
             solid);
         for (std::uint32_t k = 0; k < manifold.touch_count; ++k) {
-          visit(manifold.normal, manifold.touches[k].point, manifold.touches[k].distance);
+          visit(manifold.normal, manifold.touches[k].point, manifold.touches[k].distance, i);
         }
       }
     } else {
       found = collide(solid, at, SolidShape(shape), pose);
     }
     for (int i = 0; i < found.count; ++i) {
-      visit(found.normal, found.points[i].point, found.points[i].distance);
+      visit(found.normal, found.points[i].point, found.points[i].distance, 0u);
     }
   }
   static Vec3 centre_of(const SolidShape& solid, const Transform& at) {
@@ -221,6 +224,7 @@ class LinearQueries {
             detail::cast(detail::make_core(corner, normal), moving, rotation, from - start, local);
         if (!entry.hit || entry.is_inside) continue;
         entry.point += start;
+        entry.part = i;
         if (!first.hit || entry.fraction < first.fraction) first = entry;
       }
     } else {
@@ -234,13 +238,14 @@ class LinearQueries {
   static std::optional<ShapeHit> deepest_of(const SolidShape& solid, const Transform& at,
                                             const Body& body) {
     std::optional<ShapeHit> deepest;
-    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose, std::uint32_t part) {
       if (!bounds_overlap(solid, at, shape, pose)) return;
-      visit_touches(solid, at, shape, pose,
-                    [&](const Vec3& normal, const Vec3& point, Real distance) {
-                      if (deepest && !(distance < deepest->distance)) return;
-                      deepest = ShapeHit{body.id, 0, point, normal, distance};
-                    });
+      visit_touches(
+          solid, at, shape, pose,
+          [&](const Vec3& normal, const Vec3& point, Real distance, std::uint32_t triangle) {
+            if (deepest && !(distance < deepest->distance)) return;
+            deepest = ShapeHit{body.id, 0, point, normal, distance, part + triangle};
+          });
     });
     return deepest;
   }
@@ -273,6 +278,7 @@ class LinearQueries {
             detail::make_core(corner, normal), solid.core, rotation, from - start, kUnlimited);
         pair.distance = std::max(pair.distance, Real(0));
         pair.point += start;
+        pair.part = i;
         if (!closest.found || pair.distance < closest.distance) closest = pair;
       }
       if (!closest.found) return {};
@@ -287,13 +293,15 @@ class LinearQueries {
   static std::optional<BodyDistance> distance_of(const DistanceQuery& query, const Body& body) {
     const Transform at = make_transform(normalized(query.orientation), query.position);
     detail::ClosestPair closest;
-    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
+    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose, std::uint32_t part) {
       detail::ClosestPair pair = closest_to(query.shape, at, shape, pose);
+      pair.part += part;
       if constexpr (detail::kIsMesh<std::decay_t<decltype(shape)>>) {
         const auto deepest = pair.distance == 0 ? deepest_of(query.shape, at, body) : std::nullopt;
         if (pair.found && deepest) {
           pair.distance = deepest->distance;
           pair.normal = deepest->normal;
+          pair.part = deepest->part;
           pair.point = add_scaled(deepest->point, pair.normal, pair.distance * Real(-0.5));
         }
       }
@@ -301,9 +309,9 @@ class LinearQueries {
       closest = pair;
     });
     if (!closest.found || !(closest.distance <= query.max_distance)) return std::nullopt;
-    return BodyDistance{body.id, closest.distance, closest.point,
-                        add_scaled(closest.point, closest.normal, closest.distance),
-                        closest.normal};
+    return BodyDistance{body.id,        closest.distance,
+                        closest.point,  add_scaled(closest.point, closest.normal, closest.distance),
+                        closest.normal, closest.part};
   }
 
   static std::optional<ShapeHit> hit_of(const ShapeCast& cast, const Body& body) {
@@ -317,12 +325,13 @@ class LinearQueries {
     const Real size = std::ldexp(length({mantissa(v.x), mantissa(v.y), mantissa(v.z)}), exponent);
     const detail::LinearMotion motion{unit_direction(v), size, 1};
     detail::CastEntry first;
-    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
-      const detail::CastEntry entry = cast_to(cast.shape, at, motion, shape, pose);
+    for_each_sub_shape(body, [&](const auto& shape, const Transform& pose, std::uint32_t part) {
+      detail::CastEntry entry = cast_to(cast.shape, at, motion, shape, pose);
+      entry.part += part;
       if (entry.hit && (!first.hit || entry.fraction < first.fraction)) first = entry;
     });
     if (!first.hit) return std::nullopt;
-    return ShapeHit{body.id, first.fraction, first.point, first.normal, 0};
+    return ShapeHit{body.id, first.fraction, first.point, first.normal, 0, first.part};
   }
   /// As in a World, in which parallel edges of boxes with disjoint bounds do not touch.
   template <class S>
@@ -344,8 +353,9 @@ class LinearQueries {
     std::vector<BodyId> found;
     for (const Body& body : bodies_) {
       bool any = false;
-      for_each_sub_shape(body, [&](const auto& shape, const Transform& pose) {
-        visit_touches(solid, at, shape, pose, [&](const Vec3&, const Vec3&, Real) { any = true; });
+      for_each_sub_shape(body, [&](const auto& shape, const Transform& pose, std::uint32_t) {
+        visit_touches(solid, at, shape, pose,
+                      [&](const Vec3&, const Vec3&, Real, std::uint32_t) { any = true; });
       });
       if (any) found.push_back(body.id);
     }

@@ -348,6 +348,54 @@ TEST(RayCast, RefusesInvalidRays) {
   EXPECT_NE(complaint([&] { world.cast_ray_through({{0, 0, 0}, {0, 0, 0}}); }), "");
 }
 
+/// A compound of three balls, a mesh of a square cell and a heightfield of three cells, side by
+/// side: each query is aimed at one part.
+TEST(Query, HitsHaveTheNumbersOfPartsAndTriangles) {
+  Scene scene;
+  BodyDef body;
+  body.mass = 0;
+  Compound balls;
+  for (int i = -1; i <= 1; ++i) balls.parts.push_back({Sphere{0.4_r}, {Real(i), 0, 0}, {}, 1});
+  body.shape = balls;
+  scene.bodies.push_back(body);
+  body.position = {10, 0, 0};
+  body.shape = TriangleMesh({{-1, 0, -1}, {1, 0, -1}, {-1, 0, 1}, {1, 0, 1}},
+                            {Triangle{0, 2, 1}, Triangle{1, 2, 3}});
+  scene.bodies.push_back(body);
+  body.position = {20, 0, 0};
+  body.shape = Heightfield({.columns = 4, .rows = 2, .heights = std::vector<Real>(8), .holes = {}});
+  scene.bodies.push_back(body);
+  const World world(scene);
+  struct Aim {
+    Vec3 at;
+    std::uint32_t body, part;
+  };
+  for (const Aim& aim : {Aim{{-1, 0, 0}, 0, 0}, Aim{{0, 0, 0}, 0, 1}, Aim{{1, 0, 0}, 0, 2},
+                         Aim{{9.5_r, 0, -0.5_r}, 1, 0}, Aim{{10.5_r, 0, 0.5_r}, 1, 1},
+                         Aim{{18.7_r, 0, -0.3_r}, 2, 0}, Aim{{21.3_r, 0, 0.3_r}, 2, 5}}) {
+    const Vec3 above = aim.at + Vec3{0, 2, 0}, down{0, -4, 0};
+    const auto ray = world.cast_ray({.origin = above, .direction = down});
+    ASSERT_TRUE(ray.has_value());
+    EXPECT_EQ(ray->body.index, aim.body);
+    EXPECT_EQ(ray->part, aim.part);
+    EXPECT_EQ(world.cast_ray_through({.origin = above, .direction = down})[0].part, aim.part);
+    const Sphere small{0.1_r};
+    const auto cast = world.cast_shape({.shape = small, .position = above, .translation = down});
+    ASSERT_TRUE(cast.has_value());
+    EXPECT_EQ(cast->part, aim.part);
+    const Vec3 beside = aim.at + Vec3{0, 0.05_r, 0};
+    const auto overlap = world.cast_shape({.shape = small, .position = beside});
+    ASSERT_TRUE(overlap.has_value());
+    EXPECT_EQ(overlap->part, aim.part);
+    for (const Vec3& p : {above, beside}) {
+      const auto closest = world.closest_body({.position = p, .shape = small});
+      ASSERT_TRUE(closest.has_value());
+      EXPECT_EQ(closest->body.index, aim.body);
+      EXPECT_EQ(closest->part, aim.part);
+    }
+  }
+}
+
 TEST(Overlap, OfASphereAgreesWithTheDistanceFunctions) {
   const std::uint64_t seed = test::fresh_seed();
   SCOPED_TRACE(test::trace(seed));

@@ -159,7 +159,7 @@ class CharacterMover {
       if (bodies.empty()) return;
       const auto fixed = std::stable_partition(bodies.begin(), bodies.end(),
                                                [&](const auto& b) { return moves(b.body); });
-      for (const BodyDistance& b : bodies) report(b.body, b.point, b.normal, velocity());
+      for (const BodyDistance& b : bodies) report(b, b.normal, velocity());
       Vec3 push;
       const auto leave = [&](auto first) {
         for (int sweep = 0; sweep < kPushes; ++sweep) {
@@ -221,7 +221,7 @@ class CharacterMover {
       if (!step.hit) return;
       left *= 1 - step.distance / distance;
       const Vec3& normal = step.hit->normal;
-      report(step.hit->body, step.hit->point, normal, v);
+      report(*step.hit, normal, v);
       if (is_walkable(normal) && (walking_ || dot(v, up_) <= 0)) {
         walking_ = true;
         rise_ = 0;
@@ -366,7 +366,7 @@ class CharacterMover {
     const ShapeHit& hit = landing->hit;
     if (hit.fraction * 6 * skin * dot(hit.normal, up_) > 2 * skin) return;
     if (!is_walkable(hit.normal)) return stand(*landing, GroundState::steep, state);
-    report(hit.body, hit.point, hit.normal, v);
+    report(hit, hit.normal, v);
     walking_ = true;
     stand(*landing, GroundState::ground, state);
   }
@@ -381,6 +381,7 @@ class CharacterMover {
     }
     state->ground_state = kind;
     state->ground_body = landing.hit.body;
+    state->ground_part = landing.hit.part;
     state->ground_normal = walking_ ? landing.surface : landing.hit.normal;
     state->ground_velocity = velocity_at(world_.state(landing.hit.body), feet());
   }
@@ -396,10 +397,12 @@ class CharacterMover {
   }
 
   /// Adds a hit, or replaces a slower one of the same body.
-  void report(BodyId body, const Vec3& point, const Vec3& normal, const Vec3& v) {
-    const Vec3 relative = v + carrier_ - velocity_at(world_.state(body), point);
-    const CharacterHit hit{body, point, normal, std::max(-dot(relative, normal), Real(0))};
-    const auto known = std::ranges::find(hits_, body, &CharacterHit::body);
+  /// @param found a ShapeHit or a BodyDistance
+  void report(const auto& found, const Vec3& normal, const Vec3& v) {
+    const Vec3 relative = v + carrier_ - velocity_at(world_.state(found.body), found.point);
+    const CharacterHit hit{found.body, found.point, normal,
+                           std::max(-dot(relative, normal), Real(0)), found.part};
+    const auto known = std::ranges::find(hits_, found.body, &CharacterHit::body);
     if (known == hits_.end()) {
       hits_.push_back(hit);
     } else if (hit.approach_speed > known->approach_speed) {

@@ -44,6 +44,8 @@ class ForcesOfContacts {
       const Real along = kept[p].normal > 0 ? kept[p].normal : Real(0);
       force.force = (force.normal * along + kept[p].friction) * inverse_h_;
       force.torque = torque;
+      force.part_a = key.is_generated() ? 0 : key.part_a;
+      force.part_b = key.is_generated() ? 0 : key.part_b;
     }
     return next;
   }

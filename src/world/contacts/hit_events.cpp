@@ -37,7 +37,13 @@ class HitsOfContacts {
     const BodyId a = bodies_[key.a].id, b = bodies_[key.b].id;
     const Vec3 normal = contacts_.normal(contact), point = position(contact, fastest.point);
     const bool swapped = a.index > b.index;
-    *next++ = {swapped ? b : a, swapped ? a : b, swapped ? -normal : normal, point, fastest.speed};
+    *next++ = {swapped ? b : a,
+               swapped ? a : b,
+               swapped ? -normal : normal,
+               point,
+               fastest.speed,
+               swapped ? key.part_b : key.part_a,
+               swapped ? key.part_a : key.part_b};
     return next;
   }
 

@@ -62,20 +62,22 @@ std::optional<ShapeHit> BodyCast::hit_of(const BodyStore& bodies, std::uint32_t 
   if (deepest.touches) {
     // The points of contacts of tiny cylinders and cones are not always numbers.
     const Vec3 point = is_finite(deepest.point) ? deepest.point : solid_.pose.origin;
-    return ShapeHit{bodies.id(body), 0, point, deepest.normal, deepest.distance};
+    return ShapeHit{bodies.id(body), 0, point, deepest.normal, deepest.distance, deepest.part};
   }
   if (!(motion_.length > 0)) return std::nullopt;
   detail::LinearMotion motion = motion_;
   motion.limit = limit;
   detail::CastEntry first;
-  for_each_posed_sub_shape(bodies, body, [&](const auto& sub_shape, const Transform& at) {
-    const detail::CastEntry entry = cast_to(sub_shape, at, solid_, core_, motion);
-    if (!entry.hit || (first.hit && !(entry.fraction < first.fraction))) return;
-    first = entry;
-    motion.limit = entry.fraction;
-  });
+  for_each_posed_sub_shape(
+      bodies, body, [&](const auto& sub_shape, const Transform& at, std::uint32_t part) {
+        const detail::CastEntry entry = cast_to(sub_shape, at, solid_, core_, motion);
+        if (!entry.hit || (first.hit && !(entry.fraction < first.fraction))) return;
+        first = entry;
+        first.part += part;  // one of both is 0
+        motion.limit = entry.fraction;
+      });
   if (!first.hit) return std::nullopt;
-  return ShapeHit{bodies.id(body), first.fraction, first.point, first.normal, 0};
+  return ShapeHit{bodies.id(body), first.fraction, first.point, first.normal, 0, first.part};
 }
 
 }  // namespace JFPX_ABI

@@ -36,6 +36,7 @@ ClosestPair find_gap(const detail::Mesh auto& mesh, const Transform& at, const P
   if (deepest.touches) {
     pair.distance = deepest.distance;
     pair.normal = deepest.normal;
+    pair.part = deepest.part;
     pair.point = add_scaled(deepest.point, deepest.normal, deepest.distance * Real(-0.5));
   }
   return pair;
@@ -54,16 +55,18 @@ BodyGap::BodyGap(const DistanceQuery& query)
 std::optional<BodyDistance> BodyGap::to(const BodyStore& bodies, std::uint32_t body,
                                         Real limit) const {
   ClosestPair closest;
-  for_each_posed_sub_shape(bodies, body, [&](const auto& sub_shape, const Transform& at) {
-    const ClosestPair pair = find_gap(sub_shape, at, solid_, limit);
-    if (!pair.found || (closest.found && !(pair.distance < closest.distance))) return;
-    closest = pair;
-    limit = std::max(pair.distance, Real(0));
-  });
+  for_each_posed_sub_shape(
+      bodies, body, [&](const auto& sub_shape, const Transform& at, std::uint32_t part) {
+        const ClosestPair pair = find_gap(sub_shape, at, solid_, limit);
+        if (!pair.found || (closest.found && !(pair.distance < closest.distance))) return;
+        closest = pair;
+        closest.part += part;  // one of both is 0
+        limit = std::max(pair.distance, Real(0));
+      });
   if (!closest.found) return std::nullopt;
   const Vec3 query_point = add_scaled(closest.point, closest.normal, closest.distance);
-  return BodyDistance{bodies.id(body), closest.distance, closest.point, query_point,
-                      closest.normal};
+  return BodyDistance{bodies.id(body), closest.distance, closest.point,
+                      query_point,     closest.normal,   closest.part};
 }
 
 }  // namespace JFPX_ABI

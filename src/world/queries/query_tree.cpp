@@ -24,12 +24,13 @@ Aabb bounds_around(const Vec3& centre, const Vec3& extents) {
 /// The bounds of a body; empty for a wall.
 Aabb bounds_of(const BodyStore& bodies, std::uint32_t body) {
   Aabb bounds = TreeBlock::kEmpty;
-  for_each_posed_sub_shape(bodies, body, [&](const auto& shape, const Transform& pose) {
-    using S = std::decay_t<decltype(shape)>;
-    if constexpr (!detail::kIsWall<S>) {
-      bounds = merged(bounds, bounds_around(pose.origin, detail::half_extents(shape, pose)));
-    }
-  });
+  for_each_posed_sub_shape(
+      bodies, body, [&](const auto& shape, const Transform& pose, std::uint32_t) {
+        using S = std::decay_t<decltype(shape)>;
+        if constexpr (!detail::kIsWall<S>) {
+          bounds = merged(bounds, bounds_around(pose.origin, detail::half_extents(shape, pose)));
+        }
+      });
   return bounds;
 }
 

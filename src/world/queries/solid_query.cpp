@@ -11,8 +11,8 @@ namespace jfpx {
 inline namespace JFPX_ABI {
 namespace {
 
-/// Calls visit(contact, triangle) for the points where a solid touches a sub-shape, until it
-/// returns false. The triangles of a mesh come in any order; other shapes are triangle 0.
+/// Calls visit(contact) for the points where a solid touches a sub-shape, until it returns false.
+/// The triangles of a mesh come in any order, and are the parts of their contacts.
 template <class S, class Visit>
 void visit_touches(const QuerySolid& solid, const S& shape, const Transform& at,
                    const Visit& visit) {
@@ -26,7 +26,7 @@ void visit_touches(const QuerySolid& solid, const S& shape, const Transform& at,
       find_contact_with_triangle(instance, mesh, triangle, at, at_rest, &manifold);
       for (std::uint32_t i = 0; i < manifold.touch_count && goes_on; ++i) {
         const auto& [point, distance] = manifold.touches[i];
-        goes_on = visit(DeepestContact{true, point, manifold.normal, distance}, triangle);
+        goes_on = visit(DeepestContact{true, point, manifold.normal, distance, triangle});
       }
     };
     const auto visit_triangles = [&](const auto& s) {
@@ -49,7 +49,7 @@ void visit_touches(const QuerySolid& solid, const S& shape, const Transform& at,
     }
     for (int i = 0; i < manifold.count; ++i) {
       const ManifoldPoint& p = manifold.points[i];
-      if (!visit(DeepestContact{true, p.point, manifold.normal, p.distance}, 0)) return;
+      if (!visit(DeepestContact{true, p.point, manifold.normal, p.distance})) return;
     }
   }
 }
@@ -77,47 +77,51 @@ QuerySolid::QuerySolid(const SolidShape& solid, const Transform& at) : shape(sol
 
 bool QuerySolid::touches(const BodyStore& bodies, std::uint32_t body) const {
   bool found = false;
-  for_each_posed_sub_shape(bodies, body, [&](const auto& sub_shape, const Transform& at) {
-    if (found) return;
-    visit_touches(*this, sub_shape, at, [&](const DeepestContact&, std::uint32_t) {
-      found = true;
-      return false;
-    });
-  });
+  for_each_posed_sub_shape(bodies, body,
+                           [&](const auto& sub_shape, const Transform& at, std::uint32_t) {
+                             if (found) return;
+                             visit_touches(*this, sub_shape, at, [&](const DeepestContact&) {
+                               found = true;
+                               return false;
+                             });
+                           });
   return found;
 }
 
 namespace {
 
+/// @param part    number of the shape in its compound, or 0
 /// @param deepest receives the contact if it is deeper
 template <class S>
-void find_deepest(const QuerySolid& solid, const S& shape, const Transform& at,
+void find_deepest(const QuerySolid& solid, const S& shape, const Transform& at, std::uint32_t part,
                   DeepestContact* deepest) {
   if (!bounds_overlap(solid, shape, at)) return;
   DeepestContact own;
-  std::uint32_t number = 0;
-  visit_touches(solid, shape, at, [&](const DeepestContact& c, std::uint32_t triangle) {
-    const bool is_first = c.distance == own.distance && triangle < number;
-    if (!own.touches || c.distance < own.distance || is_first) own = c, number = triangle;
+  visit_touches(solid, shape, at, [&](const DeepestContact& c) {
+    const bool is_first = c.distance == own.distance && c.part < own.part;
+    if (!own.touches || c.distance < own.distance || is_first) own = c;
     return true;
   });
-  if (own.touches && (!deepest->touches || own.distance < deepest->distance)) *deepest = own;
+  if (!own.touches || (deepest->touches && !(own.distance < deepest->distance))) return;
+  *deepest = own;
+  deepest->part += part;  // one of both is 0
 }
 
 }  // namespace
 
 DeepestContact QuerySolid::deepest_contact(const BodyStore& bodies, std::uint32_t body) const {
   DeepestContact deepest;
-  for_each_posed_sub_shape(bodies, body, [&](const auto& sub_shape, const Transform& at) {
-    find_deepest(*this, sub_shape, at, &deepest);
-  });
+  for_each_posed_sub_shape(bodies, body,
+                           [&](const auto& sub_shape, const Transform& at, std::uint32_t part) {
+                             find_deepest(*this, sub_shape, at, part, &deepest);
+                           });
   return deepest;
 }
 
 template <class S>
 DeepestContact QuerySolid::deepest_contact(const S& mesh, const Transform& at) const {
   DeepestContact deepest;
-  find_deepest(*this, mesh, at, &deepest);
+  find_deepest(*this, mesh, at, 0, &deepest);
   return deepest;
 }
 template DeepestContact QuerySolid::deepest_contact(const TriangleMesh&, const Transform&) const;

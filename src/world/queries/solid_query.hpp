@@ -12,9 +12,10 @@ inline namespace JFPX_ABI {
 /// and of the triangle with the lowest number.
 struct DeepestContact {
   bool touches = false;
-  Vec3 point;         ///< [m], world, middle of the overlap
-  Vec3 normal;        ///< unit, from the body to the solid
-  Real distance = 0;  ///< [m], <= 0
+  Vec3 point;              ///< [m], world, middle of the overlap
+  Vec3 normal;             ///< unit, from the body to the solid
+  Real distance = 0;       ///< [m], <= 0
+  std::uint32_t part = 0;  ///< as in ShapeHit
 };
 
 /// A solid of a query.
