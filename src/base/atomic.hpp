@@ -121,6 +121,26 @@ JFPX_HD inline std::uint32_t append(std::uint32_t* size) {
 #endif
 }
 
+/// Appends an item to one of two lists: append(is_of_second ? second_size : first_size) for threads
+/// of a warp that append to different ones.
+JFPX_HD inline std::uint32_t append_to_one(std::uint32_t* first_size, std::uint32_t* second_size,
+                                           bool is_of_second) {
+  std::uint32_t* const size = is_of_second ? second_size : first_size;
+#if defined(__CUDA_ARCH__)
+  const unsigned active = __activemask(), lane = threadIdx.x % 32;
+  const unsigned of_second = __ballot_sync(active, is_of_second);
+  const unsigned lanes = is_of_second ? of_second : active & ~of_second;
+  const int first = __ffs(static_cast<int>(lanes)) - 1;
+  const std::uint32_t at = static_cast<int>(lane) == first
+                               ? atomic_add(size, static_cast<std::uint32_t>(__popc(lanes)))
+                               : 0;
+  return __shfl_sync(active, at, first) +
+         static_cast<std::uint32_t>(__popc(lanes & ((1u << lane) - 1)));
+#else
+  return atomic_add(size, 1);
+#endif
+}
+
 /// @returns the value before
 JFPX_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
 #if defined(__CUDA_ARCH__)

@@ -327,7 +327,10 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
       return lookup.find(key, &index) ? &recyclable.manifolds[index] : nullptr;
     };
     for (const Candidate& pair : candidates.subspan(first, last - first)) {
-      test_candidate(swept_bounds_, pair, recyclable.points.data(), find_last, &found);
+      if (!is_recyclable(swept_bounds_.sub_shapes, pair) ||
+          !recycle_last(swept_bounds_, pair, recyclable.points.data(), find_last, &found)) {
+        test_fully(swept_bounds_, pair, &found);
+      }
       part->add(bodies, found, keeps_keys_);
     }
   };

@@ -195,9 +195,11 @@ struct SphereProgram {
       c.spheres = c.needed.spheres = found;
       std::uint32_t all = 0, most = 0;
       for (std::uint32_t part = 0; part < d.parts; ++part) {
-        const std::uint32_t of_part = d.states[part]->candidates;
+        const PartState& state = *d.states[part];
+        const std::uint32_t of_part = state.flat_candidates + state.other_candidates;
         all += of_part;
         if (of_part > most) most = of_part;
+        c.flat_candidates += state.flat_candidates;
       }
       c.candidates = c.needed.candidates = all;
       c.needed.candidates_of_part = most;
@@ -211,10 +213,15 @@ struct SphereProgram {
  private:
   JFPX_HD void add_candidate(std::uint32_t a, std::uint32_t b, std::uint32_t element = 0) const {
     const std::uint32_t capacity = data.candidate_capacity();
-    const std::uint32_t place = append(&data.state().candidates);
-    if (place >= capacity) return;
-    data.candidates[data.part * capacity + place] =
-        ordered(data.step.bodies, data.swept_bounds.sub_shapes, a, b, element);
+    const SubShapeView& sub_shapes = data.swept_bounds.sub_shapes;
+    const bool is_flat = sub_shapes.has_flat_faces(a) && sub_shapes.has_flat_faces(b);
+    PartState& state = data.state();
+    const std::uint32_t number =
+        append_to_one(&state.other_candidates, &state.flat_candidates, is_flat);
+    if (number >= capacity) return;
+    const std::uint32_t place =
+        is_flat ? data.flat_candidate(number) : data.part * capacity + number;
+    data.candidates[place] = ordered(data.step.bodies, sub_shapes, a, b, element);
   }
 
   /// Lists the solids of mass 0 and the walls that a sub-shape of a movable body may touch.
@@ -264,9 +271,7 @@ struct ShapeProgram {
           &d.divisions.slots);
       return;
     }
-    const std::uint32_t begin = d.part * d.candidate_capacity();
-    team.team_of_part().for_each_divergent(d.state().candidates,
-                                           [&](std::uint32_t i) { test(begin + i); });
+    test_candidates(team);
     team.sync();
     team.for_each_divergent(
         d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); }, &d.divisions.slots);
@@ -303,18 +308,47 @@ struct ShapeProgram {
   }
 
  private:
-  JFPX_HD void test(std::uint32_t i) const {
+  /// First recycles contacts, then tests all other candidates. In one pass, a warp would execute
+  /// both, one after the other, for a few of its threads each.
+  template <class Team>
+  JFPX_HD void test_candidates(const Team& team) const {
+    const StepData& d = data;
+    const auto of_part = team.team_of_part();
+    const std::uint32_t begin = d.part * d.candidate_capacity();
+    if (d.counters->flat_candidates > 0) {
+      of_part.for_each_divergent(d.state().flat_candidates, [&](std::uint32_t i) {
+        const std::uint32_t candidate = d.flat_candidate(i);
+        if (is_recycled(candidate)) {
+          note(candidate);
+        } else {
+          d.full_tests[begin + append(&d.state().full_tests)] = candidate;
+        }
+      });
+      team.sync();
+    }
+    const std::uint32_t others = d.state().other_candidates;
+    of_part.for_each_divergent(others + d.state().full_tests, [&](std::uint32_t i) {
+      const std::uint32_t candidate = i < others ? begin + i : d.full_tests[begin + i - others];
+      test_fully(d.swept_bounds, d.candidates[candidate], &d.tested[candidate]);
+      note(candidate);
+    });
+  }
+
+  JFPX_HD bool is_recycled(std::uint32_t candidate) const {
+    const soft_step::ContactView last = data.last_contacts();
+    const auto find_last = [&](const soft_step::ContactKey& key) {
+      const std::uint32_t before = data.find_last_manifold(key);
+      return before == kNone ? nullptr : &last.manifolds[before];
+    };
+    return recycle_last(data.swept_bounds, data.candidates[candidate], last.points, find_last,
+                        &data.tested[candidate]);
+  }
+
+  /// Notes the result of a test.
+  JFPX_HD void note(std::uint32_t i) const {
     const StepData& d = data;
     const Candidate& pair = d.candidates[i];
-    CandidateManifold* found = &d.tested[i];
-    const soft_step::ContactView last = d.last_contacts();
-    test_candidate(
-        d.swept_bounds, pair, last.points,
-        [&](const soft_step::ContactKey& key) {
-          const std::uint32_t before = d.find_last_manifold(key);
-          return before == kNone ? nullptr : &last.manifolds[before];
-        },
-        found);
+    const CandidateManifold* const found = &d.tested[i];
     if (found->touch_count > 0) add_touches(pair, *found);
     if (found->point_count == 0) return;
     prepend(&d.first_candidate[found->key.a], d.next_candidate, i);

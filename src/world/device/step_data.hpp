@@ -157,8 +157,8 @@ struct StepCounters {
   std::uint32_t any_fast = 0;            ///< 1: ContinuousCollision::is_fast() of a sub-shape
   std::uint64_t largest_coordinate = 0;  ///< partition::magnitude_of()
 
-  std::uint32_t pairs = 0;   ///< of swept bounds
-  std::uint32_t unused = 0;  ///< instead of padding
+  std::uint32_t pairs = 0;            ///< of swept bounds
+  std::uint32_t flat_candidates = 0;  ///< candidates whose contacts may be recycled
   std::uint32_t candidates = 0, touches = 0;
   std::uint32_t spheres = 0, manifolds = 0, points = 0;  ///< sizes of the contact set
   std::uint32_t touching_spheres = 0;  ///< contacts of two spheres that touched during the step
@@ -176,10 +176,13 @@ static_assert(std::has_unique_object_representations_v<Counters>);
 
 /// What the threads of a part read or count often, in the memory of its device.
 struct PartState {
-  std::uint32_t parity = 0;      ///< of Progress::completed at the start of the step
-  ContactSizes now, last;        ///< of the contact set, as far as it is known, and of the last one
-  std::uint32_t candidates = 0;  ///< size of the list of the part
-  std::uint32_t bodies_with_manifolds = 0;              ///< bodies a of the part
+  std::uint32_t parity = 0;  ///< of Progress::completed at the start of the step
+  ContactSizes now, last;    ///< of the contact set, as far as it is known, and of the last one
+  // Sizes of the lists of the part.
+  std::uint32_t flat_candidates = 0;        ///< whose contacts may be recycled
+  std::uint32_t other_candidates = 0;       ///< all others
+  std::uint32_t full_tests = 0;             ///< flat candidates whose contacts are not recycled
+  std::uint32_t bodies_with_manifolds = 0;  ///< bodies a of the part
   std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
   std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
   std::uint32_t points_of_rows = 0;                     ///< points of other rows of manifolds
@@ -262,8 +265,10 @@ struct StepData {
   cuda::ContactCount* pair_count = nullptr;
   NormalDistance* pair_results = nullptr;  ///< by pair
   std::uint8_t* pair_found = nullptr;      ///< by pair: 1 if it is a contact of two spheres
-  /// By part: a list of candidates, with memory for the same number of them.
+  /// By part: two lists of candidates in memory for candidate_capacity() of them: from its
+  /// begin PartState::other_candidates, and from its end backwards PartState::flat_candidates.
   Candidate* candidates = nullptr;
+  std::uint32_t* full_tests = nullptr;       ///< by part: candidates
   CandidateManifold* tested = nullptr;       ///< by candidate
   std::uint32_t* first_candidate = nullptr;  ///< by body a: list of candidates that have points
   std::uint32_t* next_candidate = nullptr;   ///< by candidate
@@ -363,9 +368,13 @@ struct StepData {
     if (kind == soft_step::kKindOf<soft_step::ManifoldRow>) return capacity.manifold_rows;
     return world_joints.of_kind[kind - soft_step::kContactRowKinds];
   }
-  /// Of a part: capacity of its list of candidates.
+  /// Of a part: capacity of its lists of candidates.
   JFPX_HD std::uint32_t candidate_capacity() const {
     return parts == 1 ? capacity.candidates : capacity.candidates_of_part;
+  }
+  /// Index of a flat candidate of the part.
+  JFPX_HD std::uint32_t flat_candidate(std::uint32_t number) const {
+    return (part + 1) * candidate_capacity() - 1 - number;
   }
   /// First inner row of a block, kind and color, of kColorsPerClass + 1 colors: the last element is
   /// the end.
