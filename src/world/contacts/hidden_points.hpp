@@ -135,8 +135,16 @@ JFPX_HD inline bool is_immovable(const BodyView& bodies, std::uint32_t body) {
   return !bodies.movable(body) && !bodies.is_carrier(body);
 }
 
-/// The points of a contact that another contact of the same body a hides. Both are polyhedral and
-/// have points. They have the same solid on one side; on the other side are parts of one body, or
+/// Whether hidden_points() may find hidden points of a contact, or points that it hides.
+JFPX_HD inline bool may_hide(const SweptBounds& bounds, const Candidate& pair) {
+  const SubShapeView& sub_shapes = bounds.sub_shapes;
+  return (is_immovable(bounds.bodies, pair.b) || sub_shapes.is_part(pair.sub_shape_a) ||
+          sub_shapes.is_part(pair.sub_shape_b)) &&
+         is_polyhedral(sub_shapes, pair);
+}
+
+/// The points of a contact that another contact of the same body a hides. Both may_hide() and have
+/// points. They have the same solid on one side; on the other side are parts of one body, or
 /// immovable bodies.
 /// @returns bit i: the point i of `contact` is hidden
 JFPX_HD inline std::uint32_t hidden_points(const SweptBounds& bounds, SurfaceContact contact,

@@ -20,7 +20,8 @@ inline namespace JFPX_ABI {
 struct CandidateManifold : detail::PairManifold {
   soft_step::ContactKey key;
   soft_step::TestedPoses tested;
-  std::uint32_t hidden = 0;  ///< on a device: bit i if another contact hides the point i
+  std::uint32_t hidden = 0;     ///< on a device: bit i if another contact hides the point i
+  std::uint32_t is_listed = 0;  ///< on a device: 1 if it is in StepData::hiding
 };
 
 /// Prepares a contact of a full test for recycle().

@@ -273,9 +273,12 @@ struct ShapeProgram {
     }
     test_candidates(team);
     team.sync();
-    team.for_each_divergent(
-        d.step.bodies.capacity, [&](std::uint32_t body) { hide_points(body); }, &d.divisions.slots);
-    team.sync();
+    if (d.counters->any_hiding != 0) {
+      const std::uint32_t begin = d.part * d.candidate_capacity();
+      team.team_of_part().for_each_divergent(
+          d.state().hiding, [&](std::uint32_t i) { hide_points(d.hiding[begin + i]); });
+      team.sync();
+    }
     const auto size = [&](std::uint32_t body) { return d.manifold_sizes[body]; };
     const Range slots = range_of_part(d.step.bodies.capacity, d.part, d.parts, &d.divisions.slots);
     std::uint32_t* const bodies_with_manifolds = d.parent + slots.begin;  // not in use now
@@ -348,9 +351,16 @@ struct ShapeProgram {
   JFPX_HD void note(std::uint32_t i) const {
     const StepData& d = data;
     const Candidate& pair = d.candidates[i];
-    const CandidateManifold* const found = &d.tested[i];
+    CandidateManifold* const found = &d.tested[i];
     if (found->touch_count > 0) add_touches(pair, *found);
     if (found->point_count == 0) return;
+    found->hidden = 0;
+    found->is_listed = may_hide(d.swept_bounds, pair) ? 1 : 0;
+    if (found->is_listed != 0) {
+      d.hiding[d.part * d.candidate_capacity() + append(&d.state().hiding)] = i;
+      d.counters->any_hiding = 1;
+      atomic_exchange(&d.first_contact[found->key.a], i);  // not in use now
+    }
     prepend(&d.first_candidate[found->key.a], d.next_candidate, i);
     atomic_add(&d.manifold_sizes[found->key.a], std::uint64_t{1} << 32 | found->point_count);
   }
@@ -376,25 +386,29 @@ struct ShapeProgram {
     }
   }
 
-  /// Removes the points that another contact of the same body a hides.
-  JFPX_HD void hide_points(std::uint32_t body) const {
+  /// Removes the points of a body that other contacts hide, if a contact is that of
+  /// `first_contact`.
+  JFPX_HD void hide_points(std::uint32_t contact) const {
     const StepData& d = data;
-    const std::uint32_t first = d.first_candidate[body];
-    if (first == kNone || d.next_candidate[first] == kNone) return;
-    const SubShapeView& sub_shapes = d.swept_bounds.sub_shapes;
+    const std::uint32_t body = d.tested[contact].key.a;
+    const auto next_that_hides = [&](std::uint32_t i) {
+      while (i != kNone && d.tested[i].is_listed == 0) i = d.next_candidate[i];
+      return i;
+    };
+    if (d.first_contact[body] != contact) return;
+    d.first_contact[body] = kNone;
+    const std::uint32_t first = next_that_hides(d.first_candidate[body]);
     const auto contact_of = [&](std::uint32_t i) {
       const CandidateManifold& found = d.tested[i];
       return SurfaceContact{&d.candidates[i], found.normal, found.points, found.point_count};
     };
     bool any = false;
-    for (std::uint32_t i = first; i != kNone; i = d.next_candidate[i]) {
-      std::uint32_t& hidden = d.tested[i].hidden;
-      hidden = 0;
-      if (!is_polyhedral(sub_shapes, d.candidates[i])) continue;
-      for (std::uint32_t k = first; k != kNone; k = d.next_candidate[k]) {
-        if (k == i || !is_polyhedral(sub_shapes, d.candidates[k])) continue;
-        hidden |= hidden_points(d.swept_bounds, contact_of(i), contact_of(k));
+    for (std::uint32_t i = first; i != kNone; i = next_that_hides(d.next_candidate[i])) {
+      std::uint32_t hidden = 0;
+      for (std::uint32_t k = first; k != kNone; k = next_that_hides(d.next_candidate[k])) {
+        if (k != i) hidden |= hidden_points(d.swept_bounds, contact_of(i), contact_of(k));
       }
+      d.tested[i].hidden = hidden;
       any |= hidden != 0;
     }
     if (any) remove_hidden(body);

@@ -80,6 +80,7 @@ class ScratchBuffers {
     const std::size_t candidates = d.parts * std::size_t{d.candidate_capacity()};
     d.candidates = transfer.room(&candidates_, candidates, kEqual);
     d.full_tests = transfer.room(&full_tests_, candidates, kEqual);
+    d.hiding = transfer.room(&hiding_, candidates, kEqual);
     d.tested = transfer.room(&tested_, candidates, kEqual);
     d.next_candidate = transfer.room(&next_candidate_, candidates, kEqual);
     d.uncolored = transfer.room(&uncolored_, all_rows, by_contact);
@@ -183,10 +184,10 @@ class ScratchBuffers {
   Buffer<NormalDistance> pair_results_;
   Buffer<Candidate> candidates_;
   Buffer<CandidateManifold> tested_;
-  Buffer<std::uint32_t> full_tests_, first_candidate_, next_candidate_, first_contact_, uncolored_,
-      still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_, body_at_,
-      solver_index_, unplaced_, inner_rows_, first_inner_joint_, next_inner_joint_, inner_contacts_,
-      first_of_block_, block_number_;
+  Buffer<std::uint32_t> full_tests_, hiding_, first_candidate_, next_candidate_, first_contact_,
+      uncolored_, still_uncolored_, parent_, row_contact_, first_fixed_, next_fixed_, overflow_,
+      body_at_, solver_index_, unplaced_, inner_rows_, first_inner_joint_, next_inner_joint_,
+      inner_contacts_, first_of_block_, block_number_;
   Buffer<RowBins> bins_;
   Buffer<soft_step::UsedColors> used_colors_;
   Buffer<std::uint64_t> manifold_sizes_, first_order_;

@@ -30,7 +30,7 @@ JFPX_HD void start_counters(const Team& team, const StepData& data) {
   const auto of_part = team.team_of_part();
   PartState& state = data.state();
   of_part.once([&] {
-    state.flat_candidates = state.other_candidates = state.full_tests = 0;
+    state.flat_candidates = state.other_candidates = state.full_tests = state.hiding = 0;
     state.bodies_with_manifolds = 0;
     for (std::uint32_t& count : state.inner_rows) count = 0;
     state.inner_points = state.points_of_rows = 0;

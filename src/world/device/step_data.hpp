@@ -155,6 +155,8 @@ struct StepCounters {
   std::uint32_t manifold_rows = 0;       ///< number of rows of manifolds
   std::uint32_t crossing_colors = 0;     ///< end of the colors of crossing rows
   std::uint32_t any_fast = 0;            ///< 1: ContinuousCollision::is_fast() of a sub-shape
+  std::uint32_t any_hiding = 0;          ///< 1: a contact may_hide()
+  std::uint32_t unused = 0;              ///< instead of padding
   std::uint64_t largest_coordinate = 0;  ///< partition::magnitude_of()
 
   std::uint32_t pairs = 0;            ///< of swept bounds
@@ -182,6 +184,7 @@ struct PartState {
   std::uint32_t flat_candidates = 0;        ///< whose contacts may be recycled
   std::uint32_t other_candidates = 0;       ///< all others
   std::uint32_t full_tests = 0;             ///< flat candidates whose contacts are not recycled
+  std::uint32_t hiding = 0;                 ///< contacts that may_hide()
   std::uint32_t bodies_with_manifolds = 0;  ///< bodies a of the part
   std::uint32_t inner_rows[soft_step::kRowKinds] = {};  ///< number of inner rows, by kind
   std::uint32_t inner_points = 0;                       ///< points of inner rows of manifolds
@@ -268,8 +271,8 @@ struct StepData {
   /// By part: two lists of candidates in memory for candidate_capacity() of them: from its
   /// begin PartState::other_candidates, and from its end backwards PartState::flat_candidates.
   Candidate* candidates = nullptr;
-  std::uint32_t* full_tests = nullptr;       ///< by part: candidates
-  CandidateManifold* tested = nullptr;       ///< by candidate
+  std::uint32_t *full_tests = nullptr, *hiding = nullptr;  ///< by part: candidates
+  CandidateManifold* tested = nullptr;                     ///< by candidate
   std::uint32_t* first_candidate = nullptr;  ///< by body a: list of candidates that have points
   std::uint32_t* next_candidate = nullptr;   ///< by candidate
   /// By body a: its number of manifolds, and in the lower half that of their points.
