@@ -32,7 +32,8 @@ btCompoundShape* random_compound(BulletWorld& w, Random& random) {
   const bool has_tree = random.below(5) != 0;
   auto* compound = new btCompoundShape(has_tree);
   w.keep(compound);
-  const std::uint64_t children = random.below(3) == 0 ? 1 + random.below(3) : 1;
+  const std::uint64_t most = random.below(4) == 0 ? 10 : 3;
+  const std::uint64_t children = random.below(3) == 0 ? 1 + random.below(most) : 1;
   for (std::uint64_t k = 0; k < children; ++k) {
     const btTransform at =
         random.below(3) == 0 ? btTransform::getIdentity() : random_turned_pose(random, Real(0.4));
@@ -164,6 +165,36 @@ TEST(CompoundCommit, UpdatesSpheresInCompoundsOfOneChild) {
     ASSERT_TRUE(twins.step(90));
     // All but those whose children begin or cease to overlap.
     EXPECT_GT(twins.stats().compound_pairs, twins.stats().pairs / 2);
+  }
+}
+
+/// A floor of boxes as one compound, as levels and machines are made, with bodies of four classes.
+void add_heap_on_many_boxes(BulletWorld& w) {
+  auto* floor = new btCompoundShape();
+  w.keep(floor);
+  auto* tile = w.keep(new btBoxShape(btVector3(1, 1, 1)));
+  for (int i = 0; i < 64; ++i) {
+    const btVector3 at(btScalar(2 * (i % 8) - 7), -1, btScalar(2 * (i / 8) - 7));
+    floor->addChildShape(btTransform(btQuaternion::getIdentity(), at), tile);
+  }
+  w.add(floor, btVector3(0, 0, 0), 0);
+  const btVector3 half(btScalar(0.3), btScalar(0.2), btScalar(0.3));
+  btCollisionShape* const shapes[] = {
+      w.keep(new btSphereShape(btScalar(0.3))), w.keep(new btBoxShape(half)),
+      w.keep(new btCapsuleShape(btScalar(0.2), btScalar(0.3))), w.keep(new btCylinderShape(half))};
+  Random random(6);
+  for (int i = 0; i < 80; ++i) {
+    const Vec3 p = random.uniform_in_box({-6, Real(0.5), -6}, {6, 2, 6});
+    w.add(shapes[i % 4], btVector3(p.x, p.y, p.z));
+  }
+}
+
+TEST(CompoundCommit, UpdatesBodiesOnACompoundOfManyBoxes) {
+  for (const unsigned threads : {1u, 3u}) {
+    Twins twins(batch_options(threads));
+    twins.both([](BulletWorld& w) { add_heap_on_many_boxes(w); });
+    ASSERT_TRUE(twins.step(120));
+    EXPECT_GT(twins.stats().compound_pairs, 80u * 60u);
   }
 }
 

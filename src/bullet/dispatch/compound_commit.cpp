@@ -119,7 +119,6 @@ class CompoundPair {
     const btTransform &pose_a = a_.getWorldTransform(), &pose_b = b_.getWorldTransform();
     const btSimplePairArray& known =
         (algorithm.*member_of(ChildCacheTag()))->getOverlappingPairArray();
-    if (static_cast<std::size_t>(known.size()) > kMostChildPairs) return false;
     for (int k = 0; k < known.size(); ++k) {
       const int i = known[k].m_indexA, j = known[k].m_indexB;
       if (!has_simple_child(*a, i) || !has_simple_child(*b, j)) return false;
@@ -138,7 +137,6 @@ class CompoundPair {
     const btCompoundShape* const shape = compound(parent);
     const auto& known = algorithm.*CompoundFields::algorithms;
     if (shape == nullptr || shape->getUpdateRevision() != algorithm.*CompoundFields::revision ||
-        static_cast<std::size_t>(known.size()) > kMostChildPairs ||
         !is_simple(*other.getCollisionShape())) {
       return false;
     }
@@ -185,7 +183,7 @@ class CompoundPair {
 
   /// Adds two children with an algorithm. Returns false if Bullet removes it, or must run it.
   bool add(const Placed& first, const Placed& second, btCollisionAlgorithm* algorithm) {
-    if (!first.overlaps(second)) return false;
+    if (count_ == kMostChildPairs || !first.overlaps(second)) return false;
     const PairLink link = read_link(algorithm, &dispatch_.dispatcher);
     const bool expected =
         link.kind() == PairKind::spheres
