@@ -144,9 +144,44 @@ TEST_F(TwoWorlds, BodiesAreCompared) {
   body.forceActivationState(WANTS_DEACTIVATION);
   expect_difference("body", "activation state");
   body.forceActivationState(ACTIVE_TAG);
+  body.setHitFraction(btScalar(0.5));
+  expect_difference("body", "hit fraction");
+  body.setHitFraction(1);
+  body.applyTorque(btVector3(0, 2, 0));
+  expect_difference("body", "total torque.y");
+  body.clearForces();
+  body.applyCentralForce(btVector3(0, 0, 2));
+  expect_difference("body", "total force.z");
+  body.clearForces();
+  btVector3& lower = body.getBroadphaseHandle()->m_aabbMin;
+  lower.setX(lower.x() + 1);
+  expect_difference("body", "lower bound.x");
+  lower.setX(lower.x() - 1);
   EXPECT_FALSE(first_difference(a_.world, b_.world, 1));
   b_.world.removeRigidBody(&body);
   expect_difference("world", "number of bodies");
+}
+
+TEST_F(TwoWorlds, JointsAreCompared) {
+  btPoint2PointConstraint joint_a(*a_.bodies[2], btVector3(0, 1, 0)),
+      joint_b(*b_.bodies[2], btVector3(0, 1, 0)), second(*b_.bodies[1], btVector3(0, 1, 0));
+  btHingeConstraint hinge(*b_.bodies[2], btVector3(0, 1, 0), btVector3(1, 0, 0));
+  a_.world.addConstraint(&joint_a);
+  b_.world.addConstraint(&joint_b);
+  EXPECT_FALSE(first_difference(a_.world, b_.world, 1));
+  joint_b.setEnabled(false);
+  expect_difference("joint", "enabled");
+  joint_b.setEnabled(true);
+  joint_b.internalSetAppliedImpulse(3);
+  expect_difference("joint", "applied impulse");
+  b_.world.addConstraint(&second);
+  expect_difference("world", "number of joints");
+  b_.world.removeConstraint(&second);
+  b_.world.removeConstraint(&joint_b);
+  b_.world.addConstraint(&hinge);
+  expect_difference("joint", "type");
+  b_.world.removeConstraint(&hinge);
+  a_.world.removeConstraint(&joint_a);
 }
 
 /// ContactCheck, on world a_.

@@ -18,8 +18,8 @@ namespace bullet {
 /// The first difference between two worlds or lists of contacts.
 struct Difference {
   std::uint64_t step = 0;   ///< as passed by the caller
-  std::string what;         ///< "world", "body", "manifold", "pair"
-  std::uint64_t index = 0;  ///< into the array of bodies or manifolds; pair: the lower body
+  std::string what;         ///< "world", "body", "joint", "manifold", "pair"
+  std::uint64_t index = 0;  ///< into the array of bodies, joints or manifolds; pair: the lower body
   std::uint64_t other = 0;  ///< pair: the other body; manifold: the point; otherwise 0
   std::string field;        ///< for example "m_localPointA.x"
   double expected = 0, actual = 0;
@@ -32,8 +32,9 @@ JFPX_BULLET_API std::string to_text(const Difference& difference);
 /// Compares two worlds bit by bit: all manifolds in the order of the dispatchers' arrays, with
 /// their bodies, thresholds and every field of every point (for m_userPersistentData, only whether
 /// it is set, and not the unused component of the normal, which Bullet does not initialize for two
-/// capsules at one place); then all bodies in array order with transforms, velocities and
-/// activation.
+/// capsules at one place); then all bodies in array order with transforms, velocities, activation,
+/// forces, hit fractions and bounds in the broadphase; then all joints with type, applied impulse
+/// and whether they are enabled. Definitions, such as shapes and masses, are not compared.
 /// @param step is copied into the result.
 /// @return the first difference; empty if the worlds are identical.
 JFPX_BULLET_API std::optional<Difference> first_difference(btDynamicsWorld& expected,

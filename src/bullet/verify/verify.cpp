@@ -4,6 +4,7 @@
 #include "src/bullet/dispatch/point_fields.hpp"
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 #include <cstdio>
@@ -50,6 +51,13 @@ std::optional<Difference> compare_manifolds(const btPersistentManifold& e,
   return std::nullopt;
 }
 
+void compare_proxies(const btBroadphaseProxy& e, const btBroadphaseProxy& a, FieldComparison* c) {
+  // Not every getAabb() sets the unused component.
+  const auto used = [](const btVector3& v) { return btVector3(v.x(), v.y(), v.z()); };
+  (*c)("lower bound", used(e.m_aabbMin), used(a.m_aabbMin));
+  (*c)("upper bound", used(e.m_aabbMax), used(a.m_aabbMax));
+}
+
 void compare_bodies(const btCollisionObject& e, const btCollisionObject& a, FieldComparison* c) {
   (*c)("transform", e.getWorldTransform(), a.getWorldTransform());
   (*c)("interpolation transform", e.getInterpolationWorldTransform(),
@@ -62,12 +70,28 @@ void compare_bodies(const btCollisionObject& e, const btCollisionObject& a, Fiel
   (*c)("deactivation time", e.getDeactivationTime(), a.getDeactivationTime());
   (*c)("island tag", e.getIslandTag(), a.getIslandTag());
   (*c)("collision flags", e.getCollisionFlags(), a.getCollisionFlags());
+  (*c)("hit fraction", e.getHitFraction(), a.getHitFraction());
+  const btBroadphaseProxy *proxy_e = e.getBroadphaseHandle(), *proxy_a = a.getBroadphaseHandle();
+  (*c)("is in the broadphase", proxy_e != nullptr ? 1 : 0, proxy_a != nullptr ? 1 : 0);
+  if (proxy_e != nullptr && proxy_a != nullptr) compare_proxies(*proxy_e, *proxy_a, c);
   const btRigidBody* body_e = btRigidBody::upcast(&e);
   const btRigidBody* body_a = btRigidBody::upcast(&a);
   (*c)("is a rigid body", body_e != nullptr ? 1 : 0, body_a != nullptr ? 1 : 0);
   if (body_e == nullptr || body_a == nullptr) return;
   (*c)("linear velocity", body_e->getLinearVelocity(), body_a->getLinearVelocity());
   (*c)("angular velocity", body_e->getAngularVelocity(), body_a->getAngularVelocity());
+  (*c)("total force", body_e->getTotalForce(), body_a->getTotalForce());
+  (*c)("total torque", body_e->getTotalTorque(), body_a->getTotalTorque());
+}
+
+void compare_joints(const btTypedConstraint& e, const btTypedConstraint& a, FieldComparison* c) {
+  (*c)("type", e.getConstraintType(), a.getConstraintType());
+  (*c)("enabled", e.isEnabled() ? 1 : 0, a.isEnabled() ? 1 : 0);
+  // Without the function's assertion that the user has asked for feedback.
+  const auto impulse = [](const btTypedConstraint& joint) {
+    return const_cast<btTypedConstraint&>(joint).internalGetAppliedImpulse();
+  };
+  (*c)("applied impulse", impulse(e), impulse(a));
 }
 
 }  // namespace
@@ -79,6 +103,7 @@ std::optional<Difference> first_difference(btDynamicsWorld& expected, btDynamics
   FieldComparison counts;
   counts("number of manifolds", de.getNumManifolds(), da.getNumManifolds());
   counts("number of bodies", expected.getNumCollisionObjects(), actual.getNumCollisionObjects());
+  counts("number of joints", expected.getNumConstraints(), actual.getNumConstraints());
   if (counts.first()) return to_difference(*counts.first(), "world", 0, 0, step);
   for (int i = 0; i < de.getNumManifolds(); ++i) {
     auto difference =
@@ -93,6 +118,13 @@ std::optional<Difference> first_difference(btDynamicsWorld& expected, btDynamics
     compare_bodies(*bodies_e[i], *bodies_a[i], &compare);
     if (compare.first()) {
       return to_difference(*compare.first(), "body", static_cast<std::uint64_t>(i), 0, step);
+    }
+  }
+  for (int i = 0; i < expected.getNumConstraints(); ++i) {
+    FieldComparison compare;
+    compare_joints(*expected.getConstraint(i), *actual.getConstraint(i), &compare);
+    if (compare.first()) {
+      return to_difference(*compare.first(), "joint", static_cast<std::uint64_t>(i), 0, step);
     }
   }
   return std::nullopt;
