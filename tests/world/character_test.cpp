@@ -505,6 +505,30 @@ TEST(Character, IsPushedByDoorsThatClose) {
   }
 }
 
+TEST(Character, IsPushedUpAndDownSlopes) {
+  for (const Real degrees : {-40.0_r, -15.0_r, -4.0_r, 4.0_r, 6.0_r, 15.0_r, 30.0_r, 44.0_r}) {
+    for (const Real speed : {0.6_r, 3.0_r, 6.0_r}) {
+      SCOPED_TRACE(testing::Message() << degrees << " degrees, " << speed << " m/s");
+      const Real angle = degrees * kPi / 180;
+      const Vec3 uphill = rotate(from_axis_angle({0, 0, 1}, angle), Vec3{1, 0, 0});
+      const Vec3 normal = rotate(from_axis_angle({0, 0, 1}, angle), Vec3{0, 1, 0});
+      const BodyDef floor = fixed_body(HalfSpace{normal, 0});
+      const BodyDef pusher = kinematic_box({0.5_r, 2, 2}, uphill * -3, uphill * speed);
+      World world = query_world({floor, pusher});
+      Player player({0, 0, 0});
+      for (int n = 0; n < 20; ++n) player.walk(world, 0, 0);
+      for (int n = 0; n < static_cast<int>(360 / speed); ++n) {
+        world.step();
+        player.walk(world, 0, 0);
+        const auto closest = world.closest_body(player.query());
+        ASSERT_TRUE(closest);
+        ASSERT_GT(closest->distance, player.settings.skin * 0.45_r) << n;
+      }
+      EXPECT_GT(dot(player.feet(), uphill), 1.5_r);
+    }
+  }
+}
+
 TEST(Character, LeavesOverlapsAtTheStart) {
   const World world = query_world({test::ground(), fixed_body(Box{{1, 1, 1}}, {0, 1, 0})});
   Player player({1.1_r, -0.1_r, 0});

@@ -149,23 +149,30 @@ class CharacterMover {
   /// Moves out of bodies, and half of `skin` away from them, so that grazing an edge does not push
   /// the character aside. The sweep over planes is that of Box3D's b3SolvePlanes. Bodies that do
   /// not move come last and stop the push, so that others cannot squeeze the character through
-  /// them.
+  /// them. Those up to `skin` away deflect it, such as the slope on which the character stands:
+  /// cast() would end a push towards them at once.
   void leave_overlaps() {
     const Real margin = settings_.skin / 2;
     Real left = settings_.radius;
     for (int i = 0; i < kPushes && left > 0; ++i) {
       std::vector<BodyDistance> bodies = world_.bodies_within(
-          {position_, cast_.shape, cast_.orientation, margin * (1 - kTolerance)}, filter_);
-      if (bodies.empty()) return;
+          {position_, cast_.shape, cast_.orientation, settings_.skin * (1 + kTolerance)}, filter_);
+      const auto is_close = [&](const BodyDistance& b) {
+        return b.distance <= margin * (1 - kTolerance);
+      };
+      if (std::ranges::none_of(bodies, is_close)) return;
       const auto fixed = std::stable_partition(bodies.begin(), bodies.end(),
                                                [&](const auto& b) { return moves(b.body); });
-      for (const BodyDistance& b : bodies) report(b, b.normal, velocity());
+      for (const BodyDistance& b : bodies) {
+        if (is_close(b)) report(b, b.normal, velocity());
+      }
       Vec3 push;
       const auto leave = [&](auto first) {
         for (int sweep = 0; sweep < kPushes; ++sweep) {
           for (auto b = first; b != bodies.end(); ++b) {
+            const Real least = b < fixed ? margin : std::max(margin, b->distance);
             const Real gap = b->distance + dot(b->normal, push);
-            if (gap < margin) push += b->normal * (margin - gap);
+            if (gap < least) push += b->normal * (least - gap);
           }
         }
       };
