@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
@@ -89,7 +90,7 @@ def interpolate(before: Motion, after: Motion, t: float) -> Motion:
     before, after : BodyState or States
         Both of the same type, and States of the same bodies, in host memory.
     t : float
-        0: `before`, 1: `after`.
+        0: `before`, 1: `after`. Finite; outside of this range, the motion is extrapolated.
 
     Returns
     -------
@@ -99,8 +100,11 @@ def interpolate(before: Motion, after: Motion, t: float) -> Motion:
     Raises
     ------
     InvalidArgument
-        Different types, or arrays of different shapes.
+        Different types, arrays of different shapes, or a `t` that is not finite.
     """
+    t = _arrays.number(t, "t")
+    if not math.isfinite(t):
+        raise InvalidArgument(f"t is {t}; it must be finite")
     if type(before) is not type(after) or not isinstance(after, (BodyState, States)):
         raise InvalidArgument(f"before is a {type(before).__name__} and after a "
                               f"{type(after).__name__}; both must be BodyState or both States")

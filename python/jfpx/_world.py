@@ -35,7 +35,7 @@ class StepReport(NamedTuple):
     sphere_contacts : int
         Of these, contacts between two spheres.
     generated_contacts : int
-        0: programs in C++ can add contacts of their own.
+        Contacts of contact generators, not included in `contacts`.
     position_iterations : int
         Corrections of positions by the solver worst_first.
     velocity_iterations : int
@@ -492,7 +492,7 @@ class World:
         Raises
         ------
         Exception
-            An exception of a force that is a function. It undoes the step. With several ranks, also
+            An exception of a force or contact generator that is a function. It undoes the step. With several ranks, also
             one of the communicator, which leaves them in different states.
         OutOfMemory, DeviceError
             The state is then as before the step.
@@ -629,14 +629,14 @@ class World:
         """Replaces the state by that of a snapshot of this or of another world of the same dtype.
         The following steps are those that the other world would have made, to the last bit. The ids
         of bodies and the contacts are those of the snapshot; contact_events() has none until the
-        next step. If the snapshot was taken of a world with Python functions as forces, add the
-        same functions first, so that they have the same numbers.
+        next step. If the snapshot was taken of a world with Python functions as forces or
+        contact generators, add the same functions first, so that they have the same numbers.
 
         Raises
         ------
         InvalidSnapshot
             The bytes are damaged, or of another version or dtype, or the world has other functions
-            as forces. The world is then unchanged.
+            as forces or contact generators. The world is then unchanged.
         InvalidArgument
             `snapshot` is neither bytes nor an object with a buffer, such as a memoryview.
         OutOfMemory
@@ -1068,7 +1068,7 @@ class World:
 
         Parameters
         ----------
-        joint : DistanceJoint
+        joint : DistanceJoint, BallJoint, HingeJoint, SliderJoint, FixedJoint or WheelJoint
 
         Raises
         ------

@@ -131,9 +131,8 @@ void cast_shapes(const PythonWorld& self, const Scene& shape, const Rows<const R
                  const Vector<std::int64_t>& bodies, const Vector<Real>& fractions,
                  const Rows<Real>& points, const Rows<Real>& normals, const Vector<Real>& distances,
                  const Vector<std::int64_t>& parts) {
-  const World& world = self.get();
   ShapeCast cast{to_solid_shape(shape), {}, {}, {}};
-  for (std::size_t i = 0; i < bodies.shape(0); ++i) {
+  self.for_each_query(bodies.shape(0), [&](const World& world, std::size_t i) {
     const std::size_t turned = orientations.shape(0) == 1 ? 0 : i;
     cast.position = vec3_at(positions, i);
     cast.translation = vec3_at(translations, i);
@@ -152,7 +151,7 @@ void cast_shapes(const PythonWorld& self, const Scene& shape, const Rows<const R
     set_row(normals, i, values.normal);
     distances(i) = values.distance;
     parts(i) = values.part;
-  }
+  });
 }
 
 /// @param shape null: a point
@@ -174,10 +173,9 @@ void closest_bodies(const PythonWorld& self, const Scene* shape, const Rows<cons
                     const Vector<std::int64_t>& bodies, const Vector<Real>& distances,
                     const Rows<Real>& points, const Rows<Real>& query_points,
                     const Rows<Real>& normals, const Vector<std::int64_t>& parts) {
-  const World& world = self.get();
   DistanceQuery query;
   if (shape != nullptr) query.shape = to_solid_shape(*shape);
-  for (std::size_t i = 0; i < bodies.shape(0); ++i) {
+  self.for_each_query(bodies.shape(0), [&](const World& world, std::size_t i) {
     const std::size_t turned = orientations.shape(0) == 1 ? 0 : i;
     query.position = vec3_at(positions, i);
     query.orientation = {orientations(turned, 0), orientations(turned, 1), orientations(turned, 2),
@@ -196,7 +194,7 @@ void closest_bodies(const PythonWorld& self, const Scene* shape, const Rows<cons
     set_row(query_points, i, values.query_point);
     set_row(normals, i, values.normal);
     parts(i) = values.part;
-  }
+  });
 }
 
 /// The first hit of each ray; -1 for the body of a ray without a hit.
@@ -205,8 +203,7 @@ void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
                const Vector<std::int64_t>& bodies, const Vector<Real>& distances,
                const Rows<Real>& points, const Rows<Real>& normals,
                const Vector<std::int64_t>& parts) {
-  const World& world = self.get();
-  for (std::size_t i = 0; i < bodies.shape(0); ++i) {
+  self.for_each_query(bodies.shape(0), [&](const World& world, std::size_t i) {
     const std::size_t limit = max_distances.shape(0) == 1 ? 0 : i;
     std::optional<RayHit> hit;
     try {
@@ -222,7 +219,7 @@ void cast_rays(const PythonWorld& self, const Rows<const Real>& origins,
     set_row(points, i, values.point);
     set_row(normals, i, values.normal);
     parts(i) = values.part;
-  }
+  });
 }
 
 /// @param numbers radius, half_height, max_slope, step_height, skin

@@ -278,7 +278,7 @@ StepReport PythonWorld::run(std::uint64_t steps) {
 }
 
 void PythonWorld::close() {
-  if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+  if (in_use_ || queries_ > 0) throw ConcurrentUse(UseGuard::message("world"));
   free();
 }
 

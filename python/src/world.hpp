@@ -41,7 +41,7 @@ class PythonWorld {
   /// For changes: waits for the work of a GPU that may read device_states().
   /// @throws Closed, ConcurrentUse, DeviceError
   World& get() {
-    if (in_use_) throw ConcurrentUse(UseGuard::message("world"));
+    if (in_use_ || queries_ > 0) throw ConcurrentUse(UseGuard::message("world"));
     World& world = *existing();
     wait_for_readers();
     ++changes_;
@@ -55,6 +55,18 @@ class PythonWorld {
     scene.ignored_pairs = scene_.ignored_pairs;
     scene.joints = scene_.joints;
     return scene;
+  }
+
+  /// Calls query(world, i) for all i < count without Python's global lock, and handles its signals.
+  /// Other threads may query the world at the same time, but not change it.
+  /// @throws Closed, ConcurrentUse, the exceptions of the queries and of signal handlers
+  template <class Query>
+  void for_each_query(std::size_t count, const Query& query) const {
+    const World& world = get();
+    const QueryGuard guard(queries_);
+    const nb::gil_scoped_release release;
+    const SignalInterrupt interrupt;
+    for_each_interruptible(count, [&](std::size_t i) { query(world, i); });
   }
 
   mutable std::vector<BodyState>
@@ -86,6 +98,14 @@ class PythonWorld {
   int traverse(visitproc visit, void* arg) const;
 
  private:
+  struct QueryGuard {
+    explicit QueryGuard(std::atomic<unsigned>& queries) : queries_(queries) { ++queries_; }
+    ~QueryGuard() { --queries_; }
+    QueryGuard(const QueryGuard&) = delete;
+    QueryGuard& operator=(const QueryGuard&) = delete;
+    std::atomic<unsigned>& queries_;
+  };
+
   /// @throws DeviceError
   void wait_for_readers();
   void free() noexcept;
@@ -97,8 +117,9 @@ class PythonWorld {
   std::vector<std::pair<ForceId, nb::object>> functions_;  // outlive the world, which calls them
   std::vector<std::pair<ContactGeneratorId, nb::object>> generators_;  // likewise
   nb::object communicator_;                                            // likewise
-  std::atomic<bool> in_use_ = false;  // outlives the communicator's calls
-  Scene scene_;                       ///< of the constructor
+  std::atomic<bool> in_use_ = false;           // outlives the communicator's calls
+  mutable std::atomic<unsigned> queries_ = 0;  ///< in progress without Python's global lock
+  Scene scene_;                                ///< of the constructor
   std::unique_ptr<World> world_;
   std::uint64_t changes_ = 0;
   std::optional<int> reading_device_;  ///< has work that may read device_states()

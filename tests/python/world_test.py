@@ -441,6 +441,9 @@ def test_states_between_two_steps_are_interpolated(dtype):
     for wrong in ((before, shorter), (before, half), (tuple(before), tuple(after)), (half, 3)):
         with pytest.raises(jfpx.InvalidArgument):
             jfpx.interpolate(*wrong, 0.5)
+    for t in (np.nan, np.inf, "x", None):
+        with pytest.raises(jfpx.InvalidArgument, match="t is"):
+            jfpx.interpolate(before, after, t)
 
 
 def test_a_kinematic_body_moves_to_a_pose_in_one_step(dtype):
@@ -463,6 +466,28 @@ def test_a_kinematic_body_moves_to_a_pose_in_one_step(dtype):
                            (lambda: world.moving_to(body, (0, 0, 0), (0, 0, 0, 0)), "orientation")):
         with pytest.raises(jfpx.InvalidArgument, match=message):
             wrong()
+
+
+def test_queries_of_arrays_let_other_threads_query_but_not_change_the_world():
+    world = jfpx.World("pile")
+    origins, down = np.full((500_000, 3), [0, 50, 0], np.float32), (0, -1, 0)
+    downs = np.broadcast_to(np.float32(down), origins.shape)
+    for query in (lambda: world.cast_rays(origins, downs),
+                  lambda: world.cast_shapes({"type": "sphere", "radius": 0.1}, origins[:50_000], downs[:50_000] * 9),
+                  lambda: world.closest_bodies(origins[:50_000])):
+        results, refused, queries = [], 0, 0
+        thread = threading.Thread(target=lambda: results.append(query()))
+        thread.start()
+        while thread.is_alive():
+            hit = world.cast_ray(origins[0], down)
+            try:
+                world.wake(world.bodies[0])
+            except jfpx.ConcurrentUse:
+                refused += 1
+            queries += hit is not None
+        thread.join()
+        assert refused > 0 and queries > 0 and len(set(results[0].bodies.tolist())) == 1
+        world.step()
 
 
 def test_rays_agree_with_the_formula_of_a_sphere(rng, dtype):
