@@ -51,6 +51,11 @@ void set_states(World& world, const std::vector<BodyState>& states) {
   for (std::size_t i = 0; i < bodies.size(); ++i) world.set_state(bodies[i], states[i]);
 }
 
+nb::tuple to_python(const BodyState& s) {
+  return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation), to_triple(s.velocity),
+                        to_triple(s.angular_velocity));
+}
+
 void bind_bodies(nb::class_<PythonWorld>& world) {
   world.def("size", [](const PythonWorld& self) { return self.get().bodies().size(); })
       .def("bodies",
@@ -98,12 +103,8 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
              }
              set_states(self.get(), states);
            })
-      .def("state",
-           [](const PythonWorld& self, IdTuple id) {
-             const BodyState s = self.get().state(to_id(id));
-             return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation),
-                                   to_triple(s.velocity), to_triple(s.angular_velocity));
-           })
+      .def("state", [](const PythonWorld& self,
+                       IdTuple id) { return to_python(self.get().state(to_id(id))); })
       .def("moving_to",
            [](const PythonWorld& self, IdTuple id, Triple position, Quadruple orientation) {
              const World& of = self.get();
@@ -111,10 +112,8 @@ void bind_bodies(nb::class_<PythonWorld>& world) {
              if (const std::string fault = find_fault(goal); !fault.empty()) {
                throw InvalidArgument("the goal has a " + fault);
              }
-             const BodyState s = moving_to(of.state(to_id(id)), goal.position,
-                                           normalized(goal.orientation), of.settings().dt);
-             return nb::make_tuple(to_triple(s.position), to_quadruple(s.orientation),
-                                   to_triple(s.velocity), to_triple(s.angular_velocity));
+             return to_python(moving_to(of.state(to_id(id)), goal.position,
+                                        normalized(goal.orientation), of.settings().dt));
            })
       .def("set_state",
            [](PythonWorld& self, IdTuple id, Triple position, Quadruple orientation,

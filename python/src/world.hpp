@@ -57,8 +57,8 @@ class PythonWorld {
     return scene;
   }
 
-  /// Calls query(world, i) for all i < count without Python's global lock, and handles its signals.
-  /// Other threads may query the world at the same time, but not change it.
+  /// Calls query(world, i) for all i < count without Python's global lock. Runs due signal
+  /// handlers. Other threads may query the world at the same time, but not change it.
   /// @throws Closed, ConcurrentUse, the exceptions of the queries and of signal handlers
   template <class Query>
   void for_each_query(std::size_t count, const Query& query) const {

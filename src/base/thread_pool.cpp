@@ -533,15 +533,12 @@ void ThreadPool::check(unsigned threads) {
                         "; it must be 0 (one per core) to " + std::to_string(kMaxThreads));
 }
 
-ThreadPool::ThreadPool(unsigned threads) {
-  check(threads);
-  if (threads == 0) threads = std::min(usable_cores(), kMaxThreads);
-  if (threads > 1) workers_ = Workers::shared(threads);
-}
+ThreadPool::ThreadPool(unsigned threads) : ThreadPool(threads, {}) {}
 ThreadPool::ThreadPool(unsigned threads, EnqueueTask enqueue) : enqueue_(std::move(enqueue)) {
   check(threads);
   if (threads == 0) threads = std::min(usable_cores(), kMaxThreads);
-  if (threads > 1) workers_ = std::make_shared<Workers>(threads, false);
+  if (threads <= 1) return;
+  workers_ = enqueue_ ? std::make_shared<Workers>(threads, false) : Workers::shared(threads);
 }
 ThreadPool::~ThreadPool() = default;
 

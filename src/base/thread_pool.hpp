@@ -41,7 +41,7 @@ class JFPX_API ThreadPool {
   /// A pool without threads of its own. While a Helpers object exists, tasks take part in the
   /// loops; otherwise the calling thread runs them alone.
   /// @param threads most threads of a loop, including the caller's; 0: one per core
-  /// @throws as above
+  /// @param enqueue empty: the pool has threads of its own, as above @throws as above
   ThreadPool(unsigned threads, EnqueueTask enqueue);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;

@@ -388,9 +388,7 @@ World::World(const Scene& scene, const WorldSettings& settings) {
                           "; it must be > 0; infinity is allowed");
   }
   check_devices(scene, settings);
-  auto pool = settings.enqueue_task
-                  ? std::make_unique<ThreadPool>(settings.threads, settings.enqueue_task)
-                  : std::make_unique<ThreadPool>(settings.threads);
+  auto pool = std::make_unique<ThreadPool>(settings.threads, settings.enqueue_task);
   SphereColliderOptions options = settings.collider;
   std::vector<int> devices = settings.devices;
   if (!devices.empty()) {

@@ -119,6 +119,7 @@ class CompoundPair {
     const btTransform &pose_a = a_.getWorldTransform(), &pose_b = b_.getWorldTransform();
     const btSimplePairArray& known =
         (algorithm.*member_of(ChildCacheTag()))->getOverlappingPairArray();
+    if (static_cast<std::size_t>(known.size()) > kMostChildPairs) return false;
     for (int k = 0; k < known.size(); ++k) {
       const int i = known[k].m_indexA, j = known[k].m_indexB;
       if (!has_simple_child(*a, i) || !has_simple_child(*b, j)) return false;

@@ -354,12 +354,11 @@ void ContactFinder::test_candidates(const BodyStore& bodies, std::span<const Can
 /// @returns whether a point was hidden
 bool ContactFinder::hide_points_of_body(std::span<soft_step::ManifoldInput> run,
                                         soft_step::PointInput* points, Part* part) const {
-  const SubShapeView& sub_shapes = swept_bounds_.sub_shapes;
   part->surfaces.clear();
   auto pair = std::ranges::lower_bound(candidates_, run.front().key.a, {}, &Candidate::a);
   for (soft_step::ManifoldInput& manifold : run) {
-    while (key_of(sub_shapes, *pair) != manifold.key) ++pair;
-    if (manifold.count == 0 || !is_polyhedral(sub_shapes, *pair)) continue;
+    while (key_of(swept_bounds_.sub_shapes, *pair) != manifold.key) ++pair;
+    if (manifold.count == 0 || !may_hide(swept_bounds_, *pair)) continue;
     const SurfaceContact contact{&*pair, manifold.normal, points + manifold.first, manifold.count};
     part->surfaces.push_back({contact, &manifold, 0});
   }
