@@ -9,6 +9,8 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <ostream>
+#include <type_traits>
 #include <vector>
 
 namespace jfpx {
@@ -256,6 +258,179 @@ TEST(FrameJoint, SpringsHaveTheirFrequency) {
   }
   EXPECT_NEAR(amplitude, 1, 1e-3);
 }
+
+/// A body far from the axis of a joint: springs, motors and limits are as strong as for a body on
+/// the axis, with the world and with a second body.
+struct Lever {
+  Shape shape;
+  Vec3 centre;  ///< [m], from the joint
+  bool has_base = false;
+};
+void PrintTo(const Lever& lever, std::ostream* out) {
+  *out << "shape " << lever.shape.index() << " at " << lever.centre.x << ", " << lever.centre.y
+       << ", " << lever.centre.z << (lever.has_base ? " on a body" : "");
+}
+
+class BodyOnALever : public ::testing::TestWithParam<Lever> {
+ protected:
+  /// A world without gravity, with a joint about or along z at the origin.
+  template <class J>
+  World world_with(const J& properties, const Vec3& acceleration = {}) const {
+    Scene scene;
+    const auto add = [&](const Shape& shape, const Vec3& position, Real mass) {
+      BodyDef def;
+      def.shape = shape;
+      def.mass = mass;
+      def.position = position;
+      def.acceleration = acceleration;
+      scene.bodies.push_back(def);
+    };
+    add(GetParam().shape, GetParam().centre, 2);
+    if (GetParam().has_base) add(Box{{1, 0.5_r, 2}}, {-1, -2, 0.5_r}, 50);
+    const auto b = GetParam().has_base ? std::optional(1u) : std::nullopt;
+    J joint = properties;
+    const J frames = joint_at<J>(scene, 0, b, {}, {0, 0, 1});
+    joint.a = frames.a, joint.b = frames.b;
+    joint.anchor_a = frames.anchor_a, joint.anchor_b = frames.anchor_b;
+    joint.axes_a = frames.axes_a, joint.axes_b = frames.axes_b;
+    scene.joints = {joint};
+    return World(scene);
+  }
+  /// The motor has its speed after a step, and the joint is closed.
+  template <class J>
+  void expect_motor_speed(const J& joint) const {
+    World world = world_with(joint);
+    const JointId id = world.joints()[0];
+    for (int n = 0; n < 60; ++n) {
+      world.step();
+      ASSERT_NEAR(static_cast<double>(world.joint_state(id).speed), 3, 0.01)
+          << n << (std::is_same_v<J, HingeJoint> ? " hinge" : " slider");
+    }
+    if constexpr (std::is_same_v<J, HingeJoint>) {
+      EXPECT_LT(world.joint_state(id).length, 1e-3_r);
+    }
+  }
+  /// A spring to 0.1 has a frequency of 2 Hz.
+  template <class J>
+  void expect_frequency(const J& joint) const {
+    World world = world_with(joint);
+    for (int n = 1; n <= 60; ++n) {
+      world.step();
+      const auto position = static_cast<double>(world.joint_state(world.joints()[0]).position);
+      ASSERT_NEAR(position, 0.1 * (1 - std::cos(2 * 2 * kPiD * n / 60)), 0.02) << n;
+    }
+  }
+};
+
+TEST_P(BodyOnALever, AMotorHasItsSpeed) {
+  HingeJoint hinge;
+  hinge.motor_speed = 3, hinge.max_motor_torque = 1e4_r;
+  expect_motor_speed(hinge);
+  SliderJoint slider;
+  slider.motor_speed = 3, slider.max_motor_force = 1e4_r;
+  expect_motor_speed(slider);
+}
+
+TEST_P(BodyOnALever, ASpringHasItsFrequency) {
+  HingeJoint hinge;
+  hinge.hertz = 2, hinge.damping_ratio = 0, hinge.target_angle = 0.1_r;
+  expect_frequency(hinge);
+  SliderJoint slider;
+  slider.hertz = 2, slider.damping_ratio = 0, slider.target_position = 0.1_r;
+  expect_frequency(slider);
+}
+
+// All angles have one stiffness and damping, but inertias that differ by the square of the lever.
+TEST_P(BodyOnALever, ASpringOfAllAnglesIsStable) {
+  for (const Real hertz : {2.0_r, 10.0_r, 60.0_r}) {
+    for (const Real damping : {0.0_r, 1.0_r, 5.0_r}) {
+      BallJoint ball;
+      ball.hertz = hertz, ball.damping_ratio = damping;
+      World world = world_with(ball);
+      BodyState state = world.states()[0];
+      state.angular_velocity = {1, 0.5_r, 0.3_r};
+      state.velocity = cross(state.angular_velocity, GetParam().centre);
+      world.set_state(world.bodies()[0], state);
+      for (int n = 0; n < 5 * 60; ++n) {
+        world.step();
+        ASSERT_LT(length(world.states()[0].angular_velocity), 2) << hertz << " Hz, " << damping;
+      }
+    }
+  }
+}
+
+// The swing is locked, and has no part in the friction of the twist.
+TEST(FrameJoint, FrictionOfANarrowBallJointHasItsTorque) {
+  Scene scene;
+  BodyDef def;
+  def.mass = 2;
+  def.shape = Sphere{0.1_r};
+  def.position = {1, 0, 0};
+  def.acceleration = {};
+  scene.bodies = {def};
+  const Vec3 axis = normalized(Vec3{1, 0, 1});
+  auto joint = joint_at<BallJoint>(scene, 0, {}, {}, axis);
+  joint.cone_angle = 0;
+  joint.friction_torque = 1;
+  scene.joints = {joint};
+  World world(scene);
+  BodyState state = world.states()[0];
+  state.angular_velocity = axis * 10;
+  state.velocity = cross(state.angular_velocity, def.position);
+  world.set_state(world.bodies()[0], state);
+  for (int n = 0; n < 60; ++n) world.step();
+  const double inertia = 0.4 * 2 * 0.01 + 2 * 0.5;  // about the axis
+  EXPECT_NEAR(static_cast<double>(length(world.states()[0].angular_velocity)), 10 - 1 / inertia,
+              0.02);
+}
+
+INSTANTIATE_TEST_SUITE_P(FrameJoint, BodyOnALever,
+                         ::testing::Values(Lever{Sphere{0.1_r}, {1, 0, 0}},
+                                           Lever{Sphere{0.1_r}, {1, 0, 1}},
+                                           Lever{Box{{0.5_r, 0.05_r, 0.3_r}}, {1, 0, 0.3_r}},
+                                           Lever{Sphere{0.1_r}, {1, 0, 0}, true},
+                                           Lever{Box{{0.5_r, 0.05_r, 0.3_r}}, {1, 0, 0}, true}));
+
+class FallingLever : public BodyOnALever {};
+
+TEST_P(FallingLever, RestsAtALimitOfAHinge) {
+  HingeJoint hinge;
+  hinge.min_angle = -0.5_r, hinge.max_angle = 0.5_r;
+  World world = world_with(hinge, {0, -9.81_r, 0});
+  for (int n = 0; n < 2 * 60; ++n) world.step();
+  EXPECT_FALSE(world.awake(world.bodies()[0]));
+  const double lever = static_cast<double>(GetParam().centre.x) * std::cos(0.5);
+  EXPECT_NEAR(static_cast<double>(absolute(world.joint_state(world.joints()[0]).torque.z)),
+              2 * kG * lever, 0.05);
+}
+
+// The body may move along the cone.
+TEST_P(FallingLever, GainsNoEnergyAtLimitsOfABallJoint) {
+  BallJoint ball;
+  ball.cone_angle = 0.3_r, ball.min_twist = -0.5_r, ball.max_twist = 0.5_r;
+  World world = world_with(ball, {0, -9.81_r, 0});
+  for (int n = 0; n < 10 * 60; ++n) {
+    world.step();
+    const BodyState state = world.states()[0];
+    const Real kinetic = length_squared(state.velocity) / 2;
+    ASSERT_LT(kinetic + 9.81_r * state.position.y, 0.05_r) << n;
+    ASSERT_LT(world.joint_state(world.joints()[0]).position, 0.3006_r) << n;
+  }
+}
+
+TEST_P(FallingLever, IsHeldByAFixedJoint) {
+  World world = world_with(FixedJoint{}, {0, -9.81_r, 0});
+  for (int n = 0; n < 60; ++n) {
+    world.step();
+    ASSERT_LT(length(world.states()[0].position - GetParam().centre), 1e-4_r) << n;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(FrameJoint, FallingLever,
+                         ::testing::Values(Lever{Sphere{0.1_r}, {1, 0, 0}},
+                                           Lever{Sphere{0.1_r}, {1, 0, 1}},
+                                           Lever{Sphere{0.03_r}, {1, 0, 0.3_r}},
+                                           Lever{Box{{0.5_r, 0.05_r, 0.3_r}}, {1, 0, 0.3_r}}));
 
 /// A wheel on a vehicle that turns keeps its speed: its inertia turns within the step.
 TEST(FrameJoint, AWheelOnATurningBodyKeepsItsSpeed) {

@@ -54,7 +54,7 @@ constexpr Pin kSoftStepPins[] = {
     {"mixed", 40, 150, 0x55ba1c236c913c6eu, 0x1684125c518b8420u},
     {"capsules", 20, 200, 0xb07904e024b50ff0u, 0x8e69fe3107a6f3deu},
     {"terrain", 20, 200, 0x446c601086c8cea6u, 0x68330b32cfe2a22bu},
-    {"ragdolls", 9, 200, 0xe0029d1c8eba4b17u, 0x832309c543e8d660u},
+    {"ragdolls", 9, 200, 0xab64ca88d9f93b2fu, 0x1c21342bd079715eu},
     {"bridge", 30, 200, 0xbe74eb6733001297u, 0x89ea0582bb4e13b9u},
     // Enough for several threads to solve the contacts of a color.
     {"polydisperse", 20000, 3, 0x1fc1c4e3ef568f9au, 0xd2fc64b8df212ecbu},
@@ -62,7 +62,7 @@ constexpr Pin kSoftStepPins[] = {
 };
 
 /// joint_scene() with Solver::soft_step.
-constexpr Pin kJointPin{"joints", 100, 200, 0x87ea8843cea4deb1u, 0xa36d03502becd734u};
+constexpr Pin kJointPin{"joints", 100, 200, 0x672fc042686c713fu, 0x5814ae5d36cc4001u};
 
 struct DemoPin {
   const char* demo;

@@ -138,6 +138,12 @@ struct FramePose {
   }
 };
 
+/// @param axis in [0, 3)
+JFPX_HD inline Vec3 unit_axis(std::uint32_t axis) {
+  return {axis == 0 ? Real(1) : Real(0), axis == 1 ? Real(1) : Real(0),
+          axis == 2 ? Real(1) : Real(0)};
+}
+
 /// The impulse on the frame's body, and the angular impulses, from those of a row.
 struct FrameSum {
   Vec3 impulse, twist_frame, twist_base;
@@ -145,9 +151,9 @@ struct FrameSum {
   JFPX_HD FrameSum(const FrameParameters& p, const FrameImpulses& i, const FramePose& pose) {
     Vec3 linear = i.linear, torque = i.angular;
     const Real limit = i.lower - i.upper;
-    if (p.limited < kAngularX) linear[static_cast<int>(p.limited)] += limit;
+    if (p.limited < kAngularX) linear += unit_axis(p.limited) * limit;
     if (p.limited == kAngularX) torque += pose.twist_axis() * limit;
-    if (p.motor_axis < kAngularX) linear[static_cast<int>(p.motor_axis)] += i.motor.x;
+    if (p.motor_axis < kAngularX) linear += unit_axis(p.motor_axis) * i.motor.x;
     if (p.motor_axis == kAngularX) torque.x += i.motor.x;
     if (p.friction_torque > 0) torque += i.motor;
     if (i.cone > 0) torque -= pose.swing_axis() * i.cone;
@@ -180,44 +186,69 @@ JFPX_HD inline void warm_start(const FrameRow& row, const BodyPair& pair) {
   apply<kFixed>(pair, row.sums);
 }
 
-/// Solves response * x = v for the locked components of a symmetric, positive definite matrix; the
-/// other components of x are 0. So are those for which the matrix is singular to rounding, for
-/// example of rotations about an axis without inertia.
-/// @param locked bits 0 to 2
-JFPX_HD inline Vec3 solve_locked(const Mat3& response, const Vec3& v, std::uint32_t locked) {
-  // Factors L D L^T. A component that is not locked has a zero column, and 1 / D = 0.
-  Mat3 lower = diagonal({1, 1, 1});
-  Vec3 inverse_d, d, x = v;
-  for (int i = 0; i < 3; ++i) {
-    if ((locked >> i & 1u) == 0) continue;
-    Real pivot = response(i, i);
-    for (int k = 0; k < i; ++k) pivot -= lower(i, k) * lower(i, k) * d[k];
-    if (!(pivot > 16 * kEpsilon * response(i, i))) continue;
-    d[i] = pivot;
-    inverse_d[i] = 1 / pivot;
-    for (int j = i + 1; j < 3; ++j) {
-      Real sum = response(j, i);
-      for (int k = 0; k < i; ++k) sum -= lower(j, k) * lower(i, k) * d[k];
-      lower(j, i) = sum * inverse_d[i];
-    }
+/// Factors L D L^T of the locked rows and columns of a symmetric, positive definite matrix.
+class LockedFactors {
+ public:
+  LockedFactors() = default;
+  /// @param locked bits 0 to 2
+  /// @param whole matrix from which `m` was computed: pivots that are small compared with its
+  ///   diagonal are errors of rounding
+  JFPX_HD LockedFactors(const Mat3& m, std::uint32_t locked, const Mat3& whole) {
+    const auto inverse_of = [&](std::uint32_t i, Real pivot, Real response) {
+      const bool is_regular = (locked >> i & 1u) != 0 && pivot > 16 * kEpsilon * response;
+      return is_regular ? 1 / pivot : Real(0);
+    };
+    inverse_.x = inverse_of(0, m(0, 0), whole(0, 0));
+    const Real d_x = inverse_.x != 0 ? m(0, 0) : Real(0);
+    yx_ = inverse_.x != 0 ? m(1, 0) * inverse_.x : Real(0);
+    zx_ = inverse_.x != 0 ? m(2, 0) * inverse_.x : Real(0);
+    const Real pivot_y = m(1, 1) - yx_ * yx_ * d_x;
+    inverse_.y = inverse_of(1, pivot_y, whole(1, 1));
+    const Real d_y = inverse_.y != 0 ? pivot_y : Real(0);
+    zy_ = inverse_.y != 0 ? (m(2, 1) - zx_ * yx_ * d_x) * inverse_.y : Real(0);
+    inverse_.z = inverse_of(2, m(2, 2) - zx_ * zx_ * d_x - zy_ * zy_ * d_y, whole(2, 2));
   }
-  for (int i = 0; i < 3; ++i) {
-    if (inverse_d[i] == 0) x[i] = 0;
-    for (int k = 0; k < i; ++k) {
-      if (inverse_d[i] != 0) x[i] -= lower(i, k) * x[k];
-    }
+  JFPX_HD LockedFactors(const Mat3& m, std::uint32_t locked) : LockedFactors(m, locked, m) {}
+
+  /// Solves m * x = v for the locked components; the other components of x are 0. So are those for
+  /// which the matrix is singular to rounding, for example of rotations about an axis without
+  /// inertia.
+  JFPX_HD Vec3 solve(const Vec3& v) const {
+    const bool has_x = inverse_.x != 0, has_y = inverse_.y != 0, has_z = inverse_.z != 0;
+    Vec3 x;
+    if (has_x) x.x = v.x;
+    if (has_y) x.y = v.y - yx_ * x.x;
+    if (has_z) x.z = v.z - zx_ * x.x - zy_ * x.y;
+    x = component_product(x, inverse_);
+    if (has_y) x.y -= zy_ * x.z;
+    if (has_x) x.x = x.x - yx_ * x.y - zx_ * x.z;
+    return x;
   }
-  for (int i = 3; i-- > 0;) {
-    x[i] *= inverse_d[i];
-    for (int k = i + 1; k < 3; ++k) {
-      if (inverse_d[i] != 0) x[i] -= lower(k, i) * x[k];
-    }
+
+ private:
+  // A component that is not locked has a zero column in L, and 1 / D = 0.
+  Vec3 inverse_;  ///< 1 / D
+  Real yx_ = 0, zx_ = 0, zy_ = 0;
+};
+
+/// An impulse [N s] and an angular impulse [N m s] on the body of the frame, which act against the
+/// body of the base: in linear axes, and in axes of the base.
+struct FrameImpulse {
+  Vec3 linear, angular;
+  JFPX_HD FrameImpulse operator*(Real s) const { return {linear * s, angular * s}; }
+  JFPX_HD FrameImpulse operator+(const FrameImpulse& o) const {
+    return {linear + o.linear, angular + o.angular};
   }
-  return x;
-}
+};
 
 /// Solves a FrameRow in a sweep. Vectors are in the axes of the base, except where they are named
 /// after the world.
+///
+/// The locked degrees of freedom are one block: with K the response of the velocities to impulses,
+/// the factors are of its linear part and of the angular part that is left when the anchors are
+/// held, K_angular - K_coupling K_linear^-1 K_coupling^T. Springs, motors, limits and friction
+/// apply the impulses that keep the velocities of the locked degrees of freedom, too. Their
+/// effective masses are thus those of bodies that turn about an anchor or slide along an axis.
 template <bool kFixed>
 class FrameSolver {
  public:
@@ -233,15 +264,25 @@ class FrameSolver {
                             kFixed
                                 ? *orientations.b
                                 : projected(*orientations.b, pair.b->rotation - row->turned_b))) {
+    Mat3 coupling;
+    linear_factors_ = {linear_response(&coupling), row->parameters.locked & kAllLinear};
     if (row->parameters.is_plain != 0) return;
     Mat3 inertia = *pair_.inertia_a;
     if constexpr (!kFixed) inertia = inertia + *pair_.inertia_b;
-    angular_response_ = in_base(regular_response(inertia));
+    rotation_response_ = in_base(regular_response(inertia));
+    Vec3 held[3];
+    for (int i = 0; i < 3; ++i) {
+      coupling_.row[i] = pose_.in_linear(-transform_transpose(coupling, pose_.axes.column(i)));
+      held[i] = -linear_factors_.solve(coupling_.row[i]);
+    }
+    hold_ = from_columns(held[0], held[1], held[2]);
+    angular_response_ = rotation_response_ + coupling_ * hold_;
+    angular_factors_ = {angular_response_, row->parameters.locked >> kAngularX, rotation_response_};
   }
 
   /// In the first sweep of a substep: replaces the impulses of the last substep, which were applied
   /// along the former axes, by impulses along the current axes.
-  JFPX_HD void turn_impulse() {
+  [[gnu::noinline]] JFPX_HD void turn_impulse() {
     const JointSums before = row_->sums;
     row_->sums = sums_of<kFixed>(*row_, pair_, pose_);
     apply<kFixed>(pair_, row_->sums - before);
@@ -262,13 +303,25 @@ class FrameSolver {
 
   JFPX_HD void solve(bool use_bias) {
     const FrameParameters& p = row_->parameters;
-    if (p.sprung != 0) solve_springs();
-    if (p.motor_axis != kNoAxis) solve_motor();
-    if (p.friction_torque > 0) solve_friction();
-    if (p.limited != kNoAxis) solve_limits(use_bias);
-    if (p.has_cone != 0) solve_cone(use_bias);
-    if ((p.locked & kAllAngular) != 0) solve_rotation(use_bias);
-    if ((p.locked & kAllLinear) != 0) solve_points(use_bias);
+    const std::uint32_t locked = p.locked >> kAngularX;
+    if (locked != 0) {
+      solve_block(use_bias);
+    } else if (p.locked != 0) {
+      solve_points(use_bias);
+    }
+    if (p.is_plain == 0) {
+      if (p.sprung != 0) solve_springs();
+      if (p.motor_axis != kNoAxis) solve_motor();
+      if (p.friction_torque > 0) solve_friction();
+      if (p.limited != kNoAxis) solve_limits(use_bias);
+      if (p.has_cone != 0) solve_cone(use_bias);
+    }
+    if (!use_bias) return;
+    if (locked != 0) {
+      const Vec3 error = bounded(locked_part(pose_.angular, locked));
+      project_rotation(LockedFactors(rotation_response_, locked).solve(error), 1);
+    }
+    project_points();
   }
 
  private:
@@ -287,11 +340,16 @@ class FrameSolver {
   JFPX_HD Vec3 in_base(const Vec3& world) const { return transform_transpose(pose_.axes, world); }
 
   /// Change of the relative velocity of the anchors by an impulse, linear axes.
-  JFPX_HD Mat3 linear_response() const {
-    Mat3 response = arm_response(is_flipped_ ? pose_.arm_base : pose_.arm_frame, *pair_.inertia_a);
+  /// @param coupling receives the sum of arm_coupling()
+  [[gnu::noinline]] JFPX_HD Mat3 linear_response(Mat3* coupling) const {
+    const Vec3& arm_a = is_flipped_ ? pose_.arm_base : pose_.arm_frame;
+    *coupling = arm_coupling(arm_a, *pair_.inertia_a);
+    Mat3 response = arm_response(arm_a, *coupling);
     Real inverse_mass = pair_.a->inverse_mass;
     if constexpr (!kFixed) {
-      response = response + arm_response(pose_.arm_base, *pair_.inertia_b);
+      const Mat3 of_base = arm_coupling(pose_.arm_base, *pair_.inertia_b);
+      response = response + arm_response(pose_.arm_base, of_base);
+      *coupling = *coupling + of_base;
       inverse_mass += pair_.b->inverse_mass;
     }
     for (int i = 0; i < 3; ++i) response(i, i) += inverse_mass;
@@ -300,7 +358,7 @@ class FrameSolver {
 
   /// Velocity of the frame's anchor relative to the base, linear axes. With bias, the mean over the
   /// substep.
-  JFPX_HD Vec3 linear_velocity(bool use_bias) const {
+  [[gnu::noinline]] JFPX_HD Vec3 linear_velocity(bool use_bias) const {
     const SolverBody &frame = frame_body(), &base = base_body();
     Vec3 velocity = (frame.velocity + cross(frame.angular_velocity, pose_.arm_frame)) -
                     (base.velocity + cross(base.angular_velocity, pose_.arm_base));
@@ -319,7 +377,7 @@ class FrameSolver {
 
   /// Angular velocity of the frame relative to the base. With bias, the relative rotation of the
   /// substep, divided by its length: rotations about different axes do not commute.
-  JFPX_HD Vec3 angular_velocity(bool use_bias) const {
+  [[gnu::noinline]] JFPX_HD Vec3 angular_velocity(bool use_bias) const {
     const Vec3 frame = in_base(frame_body().angular_velocity);
     const Vec3 base = in_base(base_body().angular_velocity);
     Vec3 velocity = frame - base;
@@ -336,114 +394,153 @@ class FrameSolver {
     const Vec3 impulse = pose_.from_linear(impulse_in_linear);
     push_sum(impulse, cross(pose_.arm_frame, impulse), cross(pose_.arm_base, impulse));
   }
-  JFPX_HD void turn(const Vec3& torque_in_base) {
-    const Vec3 torque = pose_.axes * torque_in_base;
-    push_sum({}, torque, torque);
+  JFPX_HD void push(const FrameImpulse& pushed) {
+    const Vec3 impulse = pose_.from_linear(pushed.linear), torque = pose_.axes * pushed.angular;
+    push_sum(impulse, cross(pose_.arm_frame, impulse) + torque,
+             cross(pose_.arm_base, impulse) + torque);
   }
-  JFPX_HD void push_sum(const Vec3& impulse, const Vec3& twist_frame, const Vec3& twist_base) {
+  [[gnu::noinline]] JFPX_HD void push_sum(const Vec3& impulse, const Vec3& twist_frame,
+                                          const Vec3& twist_base) {
     const JointSums pushed = sums_of<kFixed>(is_flipped_, pair_, impulse, twist_frame, twist_base);
     apply<kFixed>(pair_, pushed);
     row_->sums += pushed;
   }
 
-  JFPX_HD static Vec3 unit(int i) {
-    Vec3 axis;
-    axis[i] = 1;
-    return axis;
+  /// An impulse along or about an axis, and that by which the locked degrees of freedom keep their
+  /// velocities.
+  struct AxisImpulse {
+    FrameImpulse own, held;
+    Real mass;  ///< effective mass or moment of inertia
+  };
+  [[gnu::noinline]] JFPX_HD AxisImpulse about(const Vec3& axis) const {
+    const Vec3 velocity = angular_response_ * axis;
+    const Vec3 held = -angular_factors_.solve(velocity), torque = axis + held;
+    return {{{}, axis},
+            {hold_ * torque, held},
+            inverse_of(dot(velocity, torque), dot(axis, rotation_response_ * axis))};
+  }
+  /// @param i of the linear axis, which is not locked
+  [[gnu::noinline]] JFPX_HD AxisImpulse along(std::uint32_t i) const {
+    Mat3 coupling;
+    const Vec3 axis = unit_axis(i), velocity = linear_response(&coupling) * axis;
+    const Vec3 turn = coupling_ * axis, held = -linear_factors_.solve(velocity);
+    const Vec3 torque = -angular_factors_.solve(turn + coupling_ * held);
+    const Vec3 impulse = held + hold_ * torque;
+    return {{axis, {}},
+            {impulse, torque},
+            inverse_of(dot(velocity, axis + impulse) + dot(turn, torque), dot(axis, velocity))};
+  }
+  [[gnu::noinline]] JFPX_HD void push(const AxisImpulse& axis, Real size) {
+    const FrameImpulse held = axis.held * size;
+    row_->impulses.linear += held.linear;
+    row_->impulses.angular += held.angular;
+    push(axis.own * size + held);
   }
 
-  JFPX_HD void solve_springs() {
+  [[gnu::noinline]] JFPX_HD void solve_springs() {
     const FrameParameters& p = row_->parameters;
     if ((p.sprung & kAllLinear) != 0) {
       const Spring spring(p.linear_rate, p.damping * p.linear_rate, step_);
-      const Mat3 response = linear_response();
-      for (int i = 0; i < 3; ++i) {
+      for (std::uint32_t i = 0; i < 3; ++i) {
         if ((p.sprung >> i & 1u) == 0) continue;
-        Real& impulse = row_->impulses.linear[i];
-        const Real change = spring.change(1 / response(i, i), row_->linear_error[i],
-                                          linear_velocity(false)[i], impulse);
+        const AxisImpulse axis = along(i);
+        Real& impulse = row_->impulses.linear[static_cast<int>(i)];
+        const Real change = spring.change(axis.mass, row_->linear_error[static_cast<int>(i)],
+                                          dot(unit_axis(i), linear_velocity(false)), impulse);
         impulse += change;
-        push(unit(i) * change);
+        push(axis, change);
       }
     }
     if ((p.sprung & kAllAngular) == 0) return;
     const Spring spring(p.angular_rate, p.damping * p.angular_rate, step_);
     // A spring of all angles has one stiffness; with one of each axis, it would have no potential.
-    const Mat3& response = angular_response_;
     const bool has_all = (p.sprung & kAllAngular) == kAllAngular;
-    const Real of_all = 3 * inverse_of(response(0, 0) + response(1, 1) + response(2, 2));
-    for (int i = 0; i < 3; ++i) {
-      if ((p.sprung >> (kAngularX + static_cast<std::uint32_t>(i)) & 1u) == 0) continue;
-      Real& impulse = row_->impulses.angular[i];
-      const Real change =
-          spring.change(has_all ? of_all : inverse_of(response(i, i)), row_->angular_error[i],
-                        angular_velocity(false)[i], impulse);
+    const Mat3& response = angular_response_;
+    const Real of_all = 3 * inverse_of(response(0, 0) + response(1, 1) + response(2, 2), 0);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      if ((p.sprung >> (kAngularX + i) & 1u) == 0) continue;
+      const AxisImpulse axis = about(unit_axis(i));
+      Real& impulse = row_->impulses.angular[static_cast<int>(i)];
+      const Real mass = has_all ? of_all : axis.mass;
+      const Real ratio = has_all ? of_all * dot(unit_axis(i), response * unit_axis(i)) : Real(1);
+      const Real change = spring.change(mass, row_->angular_error[static_cast<int>(i)],
+                                        dot(unit_axis(i), angular_velocity(false)), impulse, ratio);
       impulse += change;
-      turn(unit(i) * change);
+      push(axis, change);
     }
   }
 
-  /// The effective mass of a response, or 0 for a rotation without inertia.
-  JFPX_HD static Real inverse_of(Real response) { return response > 0 ? 1 / response : Real(0); }
+  /// The effective mass of a response; 0 for a rotation without inertia.
+  /// @param free response of the unlocked bodies, whose rounding errors are the least response
+  JFPX_HD static Real inverse_of(Real response, Real free) {
+    const Real least = 16 * kEpsilon * free, used = response > least ? response : least;
+    return used > 0 ? 1 / used : Real(0);
+  }
 
-  JFPX_HD void solve_motor() {
+  [[gnu::noinline]] JFPX_HD void solve_motor() {
     const FrameParameters& p = row_->parameters;
     const Real most = p.motor_limit * step_.h;
-    const auto change = [&](Real mass, Real speed) {
+    const auto drive = [&](const AxisImpulse& axis, Real speed) {
       Real& impulse = row_->impulses.motor.x;
-      const Real before = impulse, wanted = before - mass * (speed - p.motor_speed);
+      const Real before = impulse, wanted = before - axis.mass * (speed - p.motor_speed);
       impulse = wanted > most ? most : wanted < -most ? -most : wanted;
-      return impulse - before;
+      push(axis, impulse - before);
     };
     if (p.motor_axis == kAngularX) {
-      turn({change(inverse_of(angular_response_(0, 0)), angular_velocity(false).x), 0, 0});
+      drive(about(unit_axis(0)), angular_velocity(false).x);
     } else {
-      const int i = static_cast<int>(p.motor_axis);
-      push(unit(i) * change(1 / linear_response()(i, i), linear_velocity(false)[i]));
+      const std::uint32_t i = p.motor_axis;
+      drive(along(i), dot(unit_axis(i), linear_velocity(false)));
     }
   }
 
-  /// A torque against all rotations.
-  JFPX_HD void solve_friction() {
+  /// A torque against all rotations, none of which is locked.
+  [[gnu::noinline]] JFPX_HD void solve_friction() {
     const Real most = row_->parameters.friction_torque * step_.h;
     const Vec3 before = row_->impulses.motor;
-    Vec3 after = before - solve_locked(angular_response_, angular_velocity(false), 7);
+    Vec3 after = before - LockedFactors(angular_response_, 7).solve(angular_velocity(false));
     const Real size2 = length_squared(after);
     if (size2 > most * most) after *= most / square_root(size2);
     row_->impulses.motor = after;
-    turn(after - before);
+    const Vec3 torque = after - before;
+    push(AxisImpulse{{{}, torque}, {hold_ * torque, {}}, 0}, 1);
   }
 
-  /// Change of the impulse of a limit, which stays positive or zero.
+  /// Whether a limit acts, and the rate of its gap that its impulse removes.
   /// @param gap [m], [rad]; negative if the limit is violated @param speed rate of the gap
-  JFPX_HD Real limit_change(Real gap, Real speed, Real mass, bool use_bias, Real* impulse) const {
-    // A slack limit acts only if the gap is about to close. See is_idle().
-    if (!use_bias && gap > 0 && !(*impulse > 0)) return 0;
-    if (use_bias && gap > 0) speed += gap * step_.inverse_h;
-    const Real before = *impulse, wanted = before - mass * speed;
+  /// @param impulse of the limit, which stays positive or zero
+  JFPX_HD bool acts(Real gap, Real* speed, Real impulse, bool use_bias) const {
+    if (use_bias && gap > 0) *speed += gap * step_.inverse_h;
+    // In a relax sweep, a slack limit without an impulse does not act. See is_idle().
+    return impulse > 0 || ((use_bias || !(gap > 0)) && *speed < 0);
+  }
+  JFPX_HD void limit(const AxisImpulse& axis, Real side, Real speed, Real* impulse) {
+    const Real before = *impulse, wanted = before - axis.mass * speed;
     *impulse = wanted > 0 ? wanted : Real(0);
-    return *impulse - before;
+    push(axis, side * (*impulse - before));
   }
 
   /// A limit of an angle about an axis.
   /// @param side 1: the angle increases the gap, -1: it decreases the gap
   JFPX_HD void solve_angle_limit(const Vec3& axis, Real gap, Real side, bool use_bias,
                                  Real* impulse) {
-    const Real mass = inverse_of(dot(axis, angular_response_ * axis));
-    const Real speed = side * dot(axis, angular_velocity(use_bias));
-    turn(axis * (side * limit_change(gap, speed, mass, use_bias, impulse)));
-    if (use_bias && gap < 0) project_rotation(bounded(axis * (side * gap)), mass);
+    Real speed = side * dot(axis, angular_velocity(use_bias));
+    if (acts(gap, &speed, *impulse, use_bias)) limit(about(axis), side, speed, impulse);
+    if (use_bias && gap < 0) {
+      project_rotation(bounded(axis * (side * gap)),
+                       inverse_of(dot(axis, rotation_response_ * axis), 0));
+    }
   }
 
   /// A limit of the position along an axis. @param side as above
-  JFPX_HD void solve_position_limit(int i, Real gap, Real side, bool use_bias, Real* impulse) {
-    const Real mass = 1 / linear_response()(i, i);
-    const Real speed = side * linear_velocity(use_bias)[i];
-    push(unit(i) * (side * limit_change(gap, speed, mass, use_bias, impulse)));
-    if (use_bias && gap < 0) project(bounded(unit(i) * (side * gap)));
+  JFPX_HD void solve_position_limit(std::uint32_t i, Real gap, Real side, bool use_bias,
+                                    Real* impulse) {
+    Real speed = side * dot(unit_axis(i), linear_velocity(use_bias));
+    if (acts(gap, &speed, *impulse, use_bias)) limit(along(i), side, speed, impulse);
+    if (use_bias && gap < 0) project(bounded(unit_axis(i) * (side * gap)));
   }
 
-  JFPX_HD void solve_limits(bool use_bias) {
+  [[gnu::noinline]] JFPX_HD void solve_limits(bool use_bias) {
     const FrameParameters& p = row_->parameters;
     FrameImpulses& impulses = row_->impulses;
     if (p.limited == kAngularX) {
@@ -460,37 +557,41 @@ class FrameSolver {
       solve_angle_limit(axis, gap_to(p.upper, p.upper_cosine, -1), -1, use_bias, &impulses.upper);
       return;
     }
-    const int i = static_cast<int>(p.limited);
+    const std::uint32_t i = p.limited;
+    const Real position = dot(unit_axis(i), pose_.offset);
     if (p.has_lower != 0) {
-      solve_position_limit(i, pose_.offset[i] - p.lower, 1, use_bias, &impulses.lower);
+      solve_position_limit(i, position - p.lower, 1, use_bias, &impulses.lower);
     }
     if (p.has_upper != 0) {
-      solve_position_limit(i, p.upper - pose_.offset[i], -1, use_bias, &impulses.upper);
+      solve_position_limit(i, p.upper - position, -1, use_bias, &impulses.upper);
     }
   }
 
-  JFPX_HD void solve_cone(bool use_bias) {
+  [[gnu::noinline]] JFPX_HD void solve_cone(bool use_bias) {
     const FrameParameters& p = row_->parameters;
     const Real gap = 2 * (p.cone_sine * pose_.swing_cosine - p.cone_cosine * pose_.swing_sine());
     solve_angle_limit(pose_.swing_axis(), gap, -1, use_bias, &row_->impulses.cone);
   }
 
-  JFPX_HD void solve_rotation(bool use_bias) {
-    const std::uint32_t locked = row_->parameters.locked >> kAngularX;
-    const Vec3 change = -solve_locked(angular_response_, angular_velocity(use_bias), locked);
-    row_->impulses.angular += change;
-    turn(change);
-    if (!use_bias) return;
-    const Vec3 error = bounded(locked_part(pose_.angular, locked));
-    project_rotation(solve_locked(angular_response_, error, locked), 1);
+  /// Solves for all locked degrees of freedom.
+  [[gnu::noinline]] JFPX_HD void solve_block(bool use_bias) {
+    const Vec3 held = -linear_factors_.solve(linear_velocity(use_bias));
+    const Vec3 torque = -angular_factors_.solve(angular_velocity(use_bias) + coupling_ * held);
+    const FrameImpulse change{held + hold_ * torque, torque};
+    row_->impulses.linear += change.linear;
+    row_->impulses.angular += change.angular;
+    push(change);
   }
 
+  /// Solves for the locked linear degrees of freedom of a joint without other locked ones.
   JFPX_HD void solve_points(bool use_bias) {
-    const std::uint32_t locked = row_->parameters.locked & kAllLinear;
-    const Vec3 change = -solve_locked(linear_response(), linear_velocity(use_bias), locked);
+    const Vec3 change = -linear_factors_.solve(linear_velocity(use_bias));
     row_->impulses.linear += change;
     push(change);
-    if (!use_bias) return;
+  }
+
+  JFPX_HD void project_points() {
+    const std::uint32_t locked = row_->parameters.locked & kAllLinear;
     // The rotations of this row have moved the anchors, too.
     project(bounded(locked_part(pose_.offset, locked)) +
             locked_part(pose_.in_linear(moved_), locked));
@@ -517,7 +618,7 @@ class FrameSolver {
 
   /// Corrects an angular error by rotating the bodies without changing velocities.
   /// @param mass of the rotation: an effective moment of inertia, by which the error is multiplied
-  JFPX_HD void project_rotation(const Vec3& error, Real mass) {
+  [[gnu::noinline]] JFPX_HD void project_rotation(const Vec3& error, Real mass) {
     const Vec3 torque = pose_.axes * (error * (is_flipped_ ? -mass : mass));
     const Vec3 turn_a = *pair_.inertia_a * torque;
     pair_.a->rotation -= turn_a;
@@ -536,8 +637,14 @@ class FrameSolver {
   const StepConstants& step_;
   const bool is_flipped_;
   FramePose pose_;
-  Vec3 moved_;             ///< [m], world axes, way of the frame's anchor by project_rotation()
-  Mat3 angular_response_;  ///< change of the relative angular velocity by an angular impulse
+  Vec3 moved_;  ///< [m], world axes, way of the frame's anchor by project_rotation()
+  LockedFactors linear_factors_;
+  // Of joints that are not plain. Changes of the relative angular velocity by an angular impulse:
+  Mat3 rotation_response_;  ///< of unlocked bodies
+  Mat3 angular_response_;   ///< if the locked linear degrees of freedom keep their velocities
+  Mat3 coupling_;           ///< change of the relative angular velocity by an impulse
+  Mat3 hold_;               ///< the impulse by which they keep them, by an angular impulse
+  LockedFactors angular_factors_;
 };
 
 /// @param starts whether it is the first sweep of a substep

@@ -56,12 +56,18 @@ class JointBodies {
   BodyPair pair_;
 };
 
-/// Change of the velocity of a point of a body by an impulse there, without the linear part.
+/// Change of the angular velocity of a body by an impulse at a point, negated; transposed, that of
+/// the velocity of the point by an angular impulse, negated.
 /// @param arm [m], from the centre to the point @param inertia inverse inertia, symmetric
-JFPX_HD inline Mat3 arm_response(const Vec3& arm, const Mat3& inertia) {
-  const Mat3 turn = {{cross(arm, inertia.row[0]), cross(arm, inertia.row[1]),
-                      cross(arm, inertia.row[2])}};  // transposed
-  return {{cross(arm, turn.column(0)), cross(arm, turn.column(1)), cross(arm, turn.column(2))}};
+JFPX_HD inline Mat3 arm_coupling(const Vec3& arm, const Mat3& inertia) {
+  return {{cross(arm, inertia.row[0]), cross(arm, inertia.row[1]), cross(arm, inertia.row[2])}};
+}
+
+/// Change of the velocity of a point of a body by an impulse there, without the linear part.
+/// @param coupling arm_coupling() of the point
+JFPX_HD inline Mat3 arm_response(const Vec3& arm, const Mat3& coupling) {
+  return {{cross(arm, coupling.column(0)), cross(arm, coupling.column(1)),
+           cross(arm, coupling.column(2))}};
 }
 
 /// What a row has applied in a substep. The warm start of the bodies applies the same again.
@@ -140,9 +146,10 @@ struct Spring {
   /// Change of the impulse of the spring in a sweep.
   /// @param mass    effective mass @param error deflection at the start of the substep
   /// @param velocity rate of the deflection @param impulse so far in this substep
-  JFPX_HD Real change(Real mass, Real error, Real velocity, Real impulse) const {
+  /// @param ratio of the mass to the effective one of this direction, if several have one stiffness
+  JFPX_HD Real change(Real mass, Real error, Real velocity, Real impulse, Real ratio = 1) const {
     const Real pull = mass * (stiffness * error + damping * velocity);
-    return -(pull + impulse) / (1 + damping);
+    return -(pull + impulse) / (1 + damping * ratio);
   }
 };
 

@@ -75,6 +75,8 @@ FrameParameters parameters_of(const BallJoint& joint) {
   if (joint.cone_angle < kNarrow) {
     p.locked |= set_of(kAngularX + 1) | set_of(kAngularX + 2);
     p.sprung &= ~p.locked;
+    set_motor(kAngularX, 0, p.friction_torque, &p);  // friction of the twist alone
+    p.friction_torque = 0;
   } else if (joint.cone_angle < kPi) {
     const Quat half = half_angle(joint.cone_angle);
     p.has_cone = 1;

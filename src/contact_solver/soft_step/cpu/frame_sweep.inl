@@ -3,6 +3,8 @@
 #include "src/contact_solver/soft_step/cpu/frame_sweep.hpp"
 #include "src/contact_solver/soft_step/cpu/sweep_lanes.inl"
 
+#include <array>
+
 namespace jfpx {
 inline namespace JFPX_ABI {
 namespace cpu {
@@ -59,27 +61,29 @@ class FrameLanes {
     inertia_a_ = matrix(frame_vector::kInertiaA);
     if constexpr (!kFixed) inertia_b_ = matrix(frame_vector::kInertiaB);
     set_pose();
-    if constexpr (kHasAxes) {
-      Matrix inertia = inertia_a_;
-      if constexpr (!kFixed) inertia = inertia + inertia_b_;
-      angular_response_ = in_base(regular_response(inertia));
-    }
+    set_responses();
     if (starts) turn_impulse();
     if constexpr (kHasAxes) {
-      if (lanes_sprung() != 0) solve_springs();
+      const auto locked = locked_angular();
+      const Mask has_locked = S::either(S::either(locked[0], locked[1]), locked[2]);
+      const Mask has_points = S::both(mask_, S::negate_mask(has_locked));
       const Mask has_motor = S::both(mask_, S::mask_of(numbers_.has_motor));
       const Mask has_friction = S::both(mask_, S::mask_of(numbers_.has_friction));
       const Mask has_limits = S::both(mask_, S::mask_of(numbers_.has_limits));
       const Mask has_cone = S::both(mask_, S::mask_of(numbers_.has_cone));
+      if (S::any(has_points)) solve_points<kUseBias>(has_points);
+      const Mask has_block = S::both(mask_, has_locked);
+      if (S::any(has_block)) solve_block<kUseBias>(has_block);
+      if (lanes_sprung() != 0) solve_springs();
       if (S::any(has_motor)) solve_motor(has_motor);
       if (S::any(has_friction)) solve_friction(has_friction);
       if (S::any(has_limits)) solve_limits<kUseBias>(has_limits);
       if (S::any(has_cone)) solve_cone<kUseBias>(has_cone);
-      const unsigned locked = numbers_.locked[0] | numbers_.locked[1] | numbers_.locked[2];
-      const Mask has_locked = S::both(mask_, S::mask_of(locked));
-      if (S::any(has_locked)) solve_rotation<kUseBias>(has_locked);
+      if (kUseBias && S::any(has_block)) project_locked(has_block);
+    } else {
+      solve_points<kUseBias>(mask_);
     }
-    solve_points<kUseBias>();
+    if constexpr (kUseBias) project(bounded(offset_) + moved_);
     put(frame_vector::kImpulse, impulse_);
     put(frame_vector::kSpunA, spun_a_);
     if constexpr (!kFixed) put(frame_vector::kSpunB, spun_b_);
@@ -91,6 +95,7 @@ class FrameLanes {
   static constexpr unsigned kAll = (1u << kLanes) - 1;
   static Vectors zeros() { return {S::set(0), S::set(0), S::set(0)}; }
   static Vec one() { return S::set(1); }
+  Vec tiny() const { return S::set(16 * sweep_.epsilon); }
   static Vec square(const Vectors& v) { return Vectors::dot(v, v); }
   static Mask greater(Vec a, Vec b) { return S::less(b, a); }
   /// Of vectors of the frame and of the base, from those of bodies a and b, and the reverse.
@@ -250,28 +255,6 @@ class FrameLanes {
     }
     return S::set(8) * t * sum;
   }
-  void solve_springs() {
-    using namespace frame_vector;
-    const Vec zero = S::set(0), stiffness = vector(kStiffness), damping = vector(kDamping);
-    const Vec response[3] = {angular_response_.row[0].x, angular_response_.row[1].y,
-                             angular_response_.row[2].z};
-    const Mask has_all = S::mask_of(numbers_.sprung[0] & numbers_.sprung[1] & numbers_.sprung[2]);
-    const Vec of_all = S::set(3) * inverse_of((response[0] + response[1]) + response[2]);
-    for (unsigned i = 0; i < 3; ++i) {
-      const Mask mask = S::both(mask_, S::mask_of(numbers_.sprung[i]));
-      if (!S::any(mask)) continue;
-      const Vec mass = S::select(has_all, of_all, inverse_of(response[i]));
-      const Vectors velocities = angular_velocity<false>();
-      const Vec velocity = i == 0 ? velocities.x : i == 1 ? velocities.y : velocities.z;
-      const Vec impulse = vector(kAngular + i);
-      const Vec pull = mass * (stiffness * vector(kAngularError + i) + damping * velocity);
-      const Vec change = S::negate(pull + impulse) / (one() + damping);
-      put(mask, kAngular + i, impulse + change);
-      const Vec none = zero * change;
-      turn(mask, {i == 0 ? change : none, i == 1 ? change : none, i == 2 ? change : none});
-    }
-  }
-
   struct Sums {
     Vectors impulse, spun_a, spun_b;
   };
@@ -292,9 +275,17 @@ class FrameLanes {
     change(mask, &spun_a_, spun_a_ + pushed.spun_a);
     if constexpr (!kFixed) change(mask, &spun_b_, spun_b_ + pushed.spun_b);
   }
-  void turn(Mask mask, const Vectors& torque_in_base) {
-    const Vectors torque = axes_ * torque_in_base;
-    push_sum(mask, zeros(), torque, torque);
+  void push(Mask mask, const Vectors& impulse) {
+    push_sum(mask, impulse, Vectors::cross(arm_frame_, impulse),
+             Vectors::cross(arm_base_, impulse));
+  }
+  struct FrameImpulse {
+    Vectors linear, angular;
+  };
+  void push(Mask mask, const FrameImpulse& pushed) {
+    const Vectors torque = axes_ * pushed.angular;
+    push_sum(mask, pushed.linear, Vectors::cross(arm_frame_, pushed.linear) + torque,
+             Vectors::cross(arm_base_, pushed.linear) + torque);
   }
 
   Vectors in_base(const Vectors& world) const { return axes_transposed_ * world; }
@@ -317,20 +308,24 @@ class FrameLanes {
     return response;
   }
 
-  static Matrix arm_response(const Vectors& arm, const Matrix& inertia) {
-    const Matrix turn =
-        Matrix{{Vectors::cross(arm, inertia.row[0]), Vectors::cross(arm, inertia.row[1]),
-                Vectors::cross(arm, inertia.row[2])}}
-            .transposed();
-    return {{Vectors::cross(arm, turn.row[0]), Vectors::cross(arm, turn.row[1]),
-             Vectors::cross(arm, turn.row[2])}};
+  static Matrix arm_coupling(const Vectors& arm, const Matrix& inertia) {
+    return {{Vectors::cross(arm, inertia.row[0]), Vectors::cross(arm, inertia.row[1]),
+             Vectors::cross(arm, inertia.row[2])}};
   }
-  Matrix linear_response() const {
-    Matrix response =
-        arm_response(kFixed ? of_frame(arm_frame_, arm_base_) : arm_frame_, inertia_a_);
+  static Matrix arm_response(const Vectors& arm, const Matrix& coupling) {
+    const Matrix columns = coupling.transposed();
+    return {{Vectors::cross(arm, columns.row[0]), Vectors::cross(arm, columns.row[1]),
+             Vectors::cross(arm, columns.row[2])}};
+  }
+  Matrix linear_response(Matrix* coupling) const {
+    const Vectors arm_a = kFixed ? of_frame(arm_frame_, arm_base_) : arm_frame_;
+    *coupling = arm_coupling(arm_a, inertia_a_);
+    Matrix response = arm_response(arm_a, *coupling);
     Vec inverse_mass = a_.velocity.scalar;
     if constexpr (!kFixed) {
-      response = response + arm_response(arm_base_, inertia_b_);
+      const Matrix of_base = arm_coupling(arm_base_, inertia_b_);
+      response = response + arm_response(arm_base_, of_base);
+      *coupling = *coupling + of_base;
       inverse_mass = inverse_mass + b_.velocity.scalar;
     }
     response.row[0].x = response.row[0].x + inverse_mass;
@@ -379,34 +374,116 @@ class FrameLanes {
     return velocity;
   }
 
-  /// @param locked by component
-  Vectors solve_locked(const Matrix& r, const Vectors& v, const Mask (&locked)[3]) const {
-    const Vec tiny = S::set(16 * sweep_.epsilon), zero = S::set(0);
-    const auto is_regular = [&](int i, Vec pivot, Vec response) {
-      return S::both(locked[i], greater(pivot, tiny * response));
-    };
-    const Mask has_x = is_regular(0, r.row[0].x, r.row[0].x);
-    const Vec dx = S::keep(has_x, r.row[0].x), inverse_x = S::keep(has_x, one() / r.row[0].x);
-    const Vec yx = S::keep(has_x, r.row[1].x * inverse_x);
-    const Vec zx = S::keep(has_x, r.row[2].x * inverse_x);
-    const Vec pivot_y = r.row[1].y - yx * yx * dx;
-    const Mask has_y = is_regular(1, pivot_y, r.row[1].y);
-    const Vec dy = S::keep(has_y, pivot_y), inverse_y = S::keep(has_y, one() / pivot_y);
-    const Vec zy = S::keep(has_y, (r.row[2].y - zx * yx * dx) * inverse_y);
-    const Vec pivot_z = (r.row[2].z - zx * zx * dx) - zy * zy * dy;
-    const Mask has_z = is_regular(2, pivot_z, r.row[2].z);
-    const Vec inverse_z = S::keep(has_z, one() / pivot_z);
-    const Mask is_x = S::differs(inverse_x, zero), is_y = S::differs(inverse_y, zero);
-    const Mask is_z = S::differs(inverse_z, zero);
-    Vec x = S::keep(is_x, v.x);
-    Vec y = S::keep(is_y, v.y - yx * x);
-    Vec z = S::keep(is_z, (v.z - zx * x) - zy * y);
-    z = z * inverse_z;
-    y = y * inverse_y;
-    y = S::select(is_y, y - zy * z, y);
-    x = x * inverse_x;
-    x = S::select(is_x, (x - yx * y) - zx * z, x);
-    return {x, y, z};
+  /// @param tiny 16 * kEpsilon
+  struct LockedFactors {
+    Vec inverse_x, inverse_y, inverse_z, yx, zx, zy;
+    LockedFactors() = default;
+    /// @param locked by component
+    LockedFactors(const Matrix& m, const std::array<Mask, 3>& locked, Vec tiny,
+                  const Matrix& whole) {
+      const auto is_regular = [&](unsigned i, Vec pivot, Vec response) {
+        return S::both(locked[i], greater(pivot, tiny * response));
+      };
+      const Mask has_x = is_regular(0, m.row[0].x, whole.row[0].x);
+      const Vec dx = S::keep(has_x, m.row[0].x);
+      inverse_x = S::keep(has_x, one() / m.row[0].x);
+      yx = S::keep(has_x, m.row[1].x * inverse_x);
+      zx = S::keep(has_x, m.row[2].x * inverse_x);
+      const Vec pivot_y = m.row[1].y - yx * yx * dx;
+      const Mask has_y = is_regular(1, pivot_y, whole.row[1].y);
+      const Vec dy = S::keep(has_y, pivot_y);
+      inverse_y = S::keep(has_y, one() / pivot_y);
+      zy = S::keep(has_y, (m.row[2].y - zx * yx * dx) * inverse_y);
+      const Vec pivot_z = (m.row[2].z - zx * zx * dx) - zy * zy * dy;
+      const Mask has_z = is_regular(2, pivot_z, whole.row[2].z);
+      inverse_z = S::keep(has_z, one() / pivot_z);
+    }
+    LockedFactors(const Matrix& m, const std::array<Mask, 3>& locked, Vec tiny)
+        : LockedFactors(m, locked, tiny, m) {}
+    Vectors solve(const Vectors& v) const {
+      const Vec zero = S::set(0);
+      const Mask is_x = S::differs(inverse_x, zero), is_y = S::differs(inverse_y, zero);
+      const Mask is_z = S::differs(inverse_z, zero);
+      Vec x = S::keep(is_x, v.x);
+      Vec y = S::keep(is_y, v.y - yx * x);
+      Vec z = S::keep(is_z, (v.z - zx * x) - zy * y);
+      z = z * inverse_z;
+      y = y * inverse_y;
+      y = S::select(is_y, y - zy * z, y);
+      x = x * inverse_x;
+      x = S::select(is_x, (x - yx * y) - zx * z, x);
+      return {x, y, z};
+    }
+  };
+  static std::array<Mask, 3> all() { return {S::always(), S::always(), S::always()}; }
+
+  /// Computes the members of FrameSolver.
+  void set_responses() {
+    Matrix coupling;
+    linear_factors_ = {linear_response(&coupling), all(), tiny()};
+    if constexpr (!kHasAxes) return;
+    Matrix inertia = inertia_a_;
+    if constexpr (!kFixed) inertia = inertia + inertia_b_;
+    rotation_response_ = in_base(regular_response(inertia));
+    const Matrix columns = coupling.transposed();
+    Matrix held;  // transposed
+    for (unsigned i = 0; i < 3; ++i) {
+      coupling_.row[i] = (columns * axes_transposed_.row[i]).negated();
+      held.row[i] = linear_factors_.solve(coupling_.row[i]).negated();
+    }
+    hold_ = held.transposed();
+    angular_response_ = rotation_response_ + coupling_ * hold_;
+    angular_factors_ = {angular_response_, locked_angular(), tiny(), rotation_response_};
+  }
+  std::array<Mask, 3> locked_angular() const {
+    return {S::mask_of(numbers_.locked[0]), S::mask_of(numbers_.locked[1]),
+            S::mask_of(numbers_.locked[2])};
+  }
+
+  struct AxisImpulse {
+    FrameImpulse own, held;
+    Vec mass;
+  };
+  AxisImpulse about(const Vectors& axis) const {
+    const Vectors velocity = angular_response_ * axis;
+    const Vectors held = angular_factors_.solve(velocity).negated(), torque = axis + held;
+    return {
+        {zeros(), axis},
+        {hold_ * torque, held},
+        inverse_of(Vectors::dot(velocity, torque), Vectors::dot(axis, rotation_response_ * axis))};
+  }
+  void push(Mask mask, const AxisImpulse& axis, Vec size) {
+    const FrameImpulse held{axis.held.linear * size, axis.held.angular * size};
+    put(mask, frame_vector::kLinear, vectors(frame_vector::kLinear) + held.linear);
+    put(mask, frame_vector::kAngular, vectors(frame_vector::kAngular) + held.angular);
+    push(mask, FrameImpulse{axis.own.linear * size + held.linear,
+                            axis.own.angular * size + held.angular});
+  }
+  static Vectors unit(unsigned i) { return {S::set(i == 0), S::set(i == 1), S::set(i == 2)}; }
+
+  void solve_springs() {
+    using namespace frame_vector;
+    const Vec stiffness = vector(kStiffness), damping = vector(kDamping);
+    const Matrix& response = angular_response_;
+    const Mask has_all = S::mask_of(numbers_.sprung[0] & numbers_.sprung[1] & numbers_.sprung[2]);
+    const Vec of_all =
+        S::set(3) *
+        inverse_of((response.row[0].x + response.row[1].y) + response.row[2].z, S::set(0));
+    for (unsigned i = 0; i < 3; ++i) {
+      const Mask mask = S::both(mask_, S::mask_of(numbers_.sprung[i]));
+      if (!S::any(mask)) continue;
+      const AxisImpulse axis = about(unit(i));
+      const Vec mass = S::select(has_all, of_all, axis.mass);
+      const Vec ratio =
+          S::select(has_all, of_all * Vectors::dot(unit(i), angular_response_ * unit(i)), one());
+      const Vectors velocities = angular_velocity<false>();
+      const Vec velocity = i == 0 ? velocities.x : i == 1 ? velocities.y : velocities.z;
+      const Vec impulse = vector(kAngular + i);
+      const Vec pull = mass * (stiffness * vector(kAngularError + i) + damping * velocity);
+      const Vec change = S::negate(pull + impulse) / (one() + damping * ratio);
+      put(mask, kAngular + i, impulse + change);
+      push(mask, axis, change);
+    }
   }
   Vectors bounded(const Vectors& error) const {
     const Vectors way = error * S::set(sweep_.correction);
@@ -416,59 +493,67 @@ class FrameLanes {
     return Vectors::select(is_far, way * (most / S::square_root(size2)), way);
   }
 
-  static Vec inverse_of(Vec response) {
-    return S::keep(greater(response, S::set(0)), one() / response);
+  Vec inverse_of(Vec response, Vec free) const {
+    const Vec least = tiny() * free, used = S::select(greater(response, least), response, least);
+    return S::keep(greater(used, S::set(0)), one() / used);
   }
   void solve_motor(Mask mask) {
     using namespace frame_vector;
     const Vec most = vector(kMotorLimit) * S::set(sweep_.h);
-    const Vec mass = inverse_of(angular_response_.row[0].x), speed = angular_velocity<false>().x;
-    const Vec before = vector(kMotor), wanted = before - mass * (speed - vector(kMotorSpeed));
+    const AxisImpulse axis = about(unit(0));
+    const Vec before = vector(kMotor), speed = angular_velocity<false>().x;
+    const Vec wanted = before - axis.mass * (speed - vector(kMotorSpeed));
     const Vec least = S::negate(most);
     const Vec after =
         S::select(greater(wanted, most), most, S::select(S::less(wanted, least), least, wanted));
     put(mask, kMotor, after);
-    turn(mask, {after - before, S::set(0), S::set(0)});
+    push(mask, axis, after - before);
   }
   void solve_friction(Mask mask) {
     using namespace frame_vector;
     const Vec most = vector(kFrictionTorque) * S::set(sweep_.h);
     const Vectors before = vectors(kMotor);
-    const Mask all[3] = {S::always(), S::always(), S::always()};
-    Vectors after = before - solve_locked(angular_response_, angular_velocity<false>(), all);
+    const LockedFactors factors(angular_response_, all(), tiny());
+    Vectors after = before - factors.solve(angular_velocity<false>());
     const Vec size2 = square(after);
     after =
         Vectors::select(greater(size2, most * most), after * (most / S::square_root(size2)), after);
     put(mask, kMotor, after);
-    turn(mask, after - before);
+    const Vectors torque = after - before;
+    push(mask, AxisImpulse{{zeros(), torque}, {hold_ * torque, zeros()}, S::set(0)}, one());
   }
 
-  /// @param impulse number of the vector
   template <bool kUseBias>
-  Vec limit_change(Mask mask, Vec gap, Vec speed, Vec mass, std::size_t impulse) {
-    const Vec zero = S::set(0), before = vector(impulse);
-    const Mask is_slack = greater(gap, zero);
-    Mask acts = mask;
+  Mask acts(Vec gap, Vec* speed, Vec impulse) const {
+    const Vec zero = S::set(0);
+    const Mask is_slack = greater(gap, zero), is_active = greater(impulse, zero);
     if constexpr (kUseBias) {
-      speed = S::select(is_slack, speed + gap * S::set(sweep_.inverse_h), speed);
+      *speed = S::select(is_slack, *speed + gap * S::set(sweep_.inverse_h), *speed);
+      return S::either(is_active, S::less(*speed, zero));
     } else {
-      acts = S::both(acts, S::either(S::negate_mask(is_slack), greater(before, zero)));
+      return S::either(is_active, S::both(S::negate_mask(is_slack), S::less(*speed, zero)));
     }
-    const Vec wanted = before - mass * speed;
-    const Vec after = S::keep(greater(wanted, zero), wanted);
-    put(acts, impulse, after);
-    return S::keep(acts, after - before);
   }
   /// @param side 1: the angle increases the gap, -1: it decreases the gap
+  /// @param impulse number of the vector
   template <bool kUseBias>
   void solve_angle_limit(Mask mask, const Vectors& axis, Vec gap, Real side, std::size_t impulse) {
-    const Vec sign = S::set(side);
-    const Vec mass = inverse_of(Vectors::dot(axis, angular_response_ * axis));
-    const Vec speed = sign * Vectors::dot(axis, angular_velocity<kUseBias>());
-    turn(mask, axis * (sign * limit_change<kUseBias>(mask, gap, speed, mass, impulse)));
+    const Vec sign = S::set(side), before = vector(impulse);
+    Vec speed = sign * Vectors::dot(axis, angular_velocity<kUseBias>());
+    const Mask active = S::both(mask, acts<kUseBias>(gap, &speed, before));
+    if (S::any(active)) {
+      const AxisImpulse turn = about(axis);
+      const Vec wanted = before - turn.mass * speed;
+      const Vec after = S::keep(greater(wanted, S::set(0)), wanted);
+      put(active, impulse, after);
+      push(active, turn, sign * (after - before));
+    }
     if constexpr (kUseBias) {
       const Mask overlaps = S::both(mask, S::less(gap, S::set(0)));
-      if (S::any(overlaps)) project_rotation(overlaps, bounded(axis * (sign * gap)), mass);
+      if (S::any(overlaps)) {
+        project_rotation(overlaps, bounded(axis * (sign * gap)),
+                         inverse_of(Vectors::dot(axis, rotation_response_ * axis), S::set(0)));
+      }
     }
   }
   template <bool kUseBias>
@@ -496,31 +581,31 @@ class FrameLanes {
     solve_angle_limit<kUseBias>(mask, swing_axis(), gap, -1, kCone);
   }
   template <bool kUseBias>
-  void solve_rotation(Mask mask) {
+  void solve_block(Mask mask) {
     using namespace frame_vector;
-    const Mask locked[3] = {S::mask_of(numbers_.locked[0]), S::mask_of(numbers_.locked[1]),
-                            S::mask_of(numbers_.locked[2])};
-    const Vectors change =
-        solve_locked(angular_response_, angular_velocity<kUseBias>(), locked).negated();
-    put(mask, kAngular, vectors(kAngular) + change);
-    turn(mask, change);
-    if constexpr (kUseBias) {
-      const Vectors part{S::keep(locked[0], angular_.x), S::keep(locked[1], angular_.y),
-                         S::keep(locked[2], angular_.z)};
-      project_rotation(mask, solve_locked(angular_response_, bounded(part), locked), one());
-    }
+    const Vectors held = linear_factors_.solve(linear_velocity<kUseBias>()).negated();
+    const Vectors torque =
+        angular_factors_.solve(angular_velocity<kUseBias>() + coupling_ * held).negated();
+    const FrameImpulse change{held + hold_ * torque, torque};
+    put(mask, kLinear, vectors(kLinear) + change.linear);
+    put(mask, kAngular, vectors(kAngular) + change.angular);
+    push(mask, change);
   }
   template <bool kUseBias>
-  void solve_points() {
+  void solve_points(Mask mask) {
     using namespace frame_vector;
-    const Mask all[3] = {S::always(), S::always(), S::always()};
-    const Vectors change =
-        solve_locked(linear_response(), linear_velocity<kUseBias>(), all).negated();
-    put(kLinear, vectors(kLinear) + change);
-    push_sum(mask_, change, Vectors::cross(arm_frame_, change), Vectors::cross(arm_base_, change));
-    if constexpr (kUseBias) project(bounded(offset_) + moved_);
+    const Vectors change = linear_factors_.solve(linear_velocity<kUseBias>()).negated();
+    put(mask, kLinear, vectors(kLinear) + change);
+    push(mask, change);
   }
 
+  void project_locked(Mask mask) {
+    const auto locked = locked_angular();
+    const Vectors part{S::keep(locked[0], angular_.x), S::keep(locked[1], angular_.y),
+                       S::keep(locked[2], angular_.z)};
+    const LockedFactors factors(rotation_response_, locked, tiny());
+    project_rotation(mask, factors.solve(bounded(part)), one());
+  }
   /// separate()
   void project(const Vectors& way) {
     Vec inverse_mass = a_.velocity.scalar;
@@ -638,7 +723,8 @@ class FrameLanes {
   Vec swing_cosine_;
   // FrameSolver.
   Vectors moved_;
-  Matrix angular_response_;
+  Matrix rotation_response_, angular_response_, coupling_, hold_;
+  LockedFactors linear_factors_, angular_factors_;
 };
 
 /// Calls one(rows) for the rows of a bundle. @returns one bit per row that is skipped
