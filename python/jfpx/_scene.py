@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -51,7 +52,8 @@ class Scene:
         try:
             text = json.dumps(fields, default=_to_json, allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise InvalidScene(f"the scene has no JSON form: {error}") from None
+            reason = _not_finite(fields, "") if isinstance(error, ValueError) else None
+            raise InvalidScene(reason or f"the scene has no JSON form: {error}") from None
         self._scene = _arrays.precision_of(dtype).Scene.from_json(text)
 
     @classmethod
@@ -370,6 +372,19 @@ def _to_json(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise TypeError(f"{value!r} is neither a number, a text, a list nor a dict")
+
+
+def _not_finite(value: Any, path: str) -> str | None:
+    """A message with the path of the first number of a scene that is not finite."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"{path} is {value}; it must be finite"
+    found = (_not_finite(item, f"{path}.{key}" if path else str(key)) for key, item in value.items()
+             ) if isinstance(value, Mapping) else (
+             _not_finite(item, f"{path}[{i}]") for i, item in enumerate(value)
+             ) if isinstance(value, (list, tuple)) else iter(())
+    return next((message for message in found if message), None)
 
 
 def scene_names() -> dict[str, str]:

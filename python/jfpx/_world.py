@@ -1451,6 +1451,8 @@ class World:
             A number is out of its range, or the move ends outside [-1e9, 1e9].
         OutOfMemory, DeviceError, and exceptions of `filter`
         """
+        state = _arrays.instance(state, "state", CharacterState)
+        settings = _arrays.instance(settings, "settings", CharacterSettings)
         if state.ground not in _GROUND_STATES:
             raise InvalidArgument(f'ground is {state.ground!r}; it must be "air", "ground" or "steep"')
         numbers = [_arrays.number(getattr(settings, name), name)

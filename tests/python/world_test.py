@@ -2,6 +2,7 @@
 
 import copy
 import gc
+import math
 import os
 import pathlib
 import pickle
@@ -1133,7 +1134,11 @@ def test_a_world_and_its_forces_are_collected():
     (lambda w: jfpx.Scene({"bodys": []}), jfpx.InvalidScene, "bodys"),
     (lambda w: jfpx.Scene({"bodies": [{**BALL, "mass": -1}]}), jfpx.InvalidScene, "mass"),
     (lambda w: jfpx.Scene({"bodies": [{**BALL, "mass": object()}]}), jfpx.InvalidScene, "JSON"),
-    (lambda w: jfpx.Scene({"dt": float("nan")}), jfpx.InvalidScene, "JSON form"),
+    (lambda w: jfpx.Scene({"dt": float("nan")}), jfpx.InvalidScene, "dt is nan; it must be finite"),
+    (lambda w: jfpx.Scene({"bodies": [BALL, {**BALL, "position": np.array([0, math.inf, 0])}]}),
+     jfpx.InvalidScene, r"bodies\[1\].position\[1\] is inf"),
+    (lambda w: w.add({**BALL, "mass": np.float32("nan")}), jfpx.InvalidScene, "mass is nan"),
+    (lambda w: w.move_character((1, 2, 3), 0.1), jfpx.InvalidArgument, "state is .* CharacterState"),
     (lambda w: jfpx.Scene(dtype="int32"), jfpx.InvalidArgument, "dtype is 'int32'"),
     (lambda w: jfpx.Scene.from_json("{"), jfpx.InvalidScene, "line 1"),
     (lambda w: jfpx.Scene.load("/nowhere/scene.json"), jfpx.FileError, "/nowhere/scene.json"),
