@@ -15,12 +15,12 @@ from ._errors import (BackendUnavailable, Closed, ConcurrentUse, DeviceError, Er
                       InvalidArgument, InvalidScene, InvalidSnapshot, OutOfMemory)
 from ._forces import (Attachment, BodyId, BodyState, Bungee, Buoyancy, Drag, Explosion,
                       ForceContext, Gravity, Spring, States, interpolate)
-from ._joints import (BallJoint, DistanceJoint, FixedJoint, HingeJoint, JointId, JointState,
-                      SliderJoint, WheelJoint)
+from ._joints import (BallJoint, DistanceJoint, FixedJoint, HingeJoint, Joint, JointId, JointState,
+                      SliderJoint, WheelJoint, place_joint)
 from ._nearest import Nearest, PeriodicNearest, find_nearest
 from ._neighbors import Neighbors, find_neighbors
 from ._recording import Recording, RecordingWriter, TrajectoryWriter
-from ._scene import Scene, scene_names
+from ._scene import Scene, centred, scene_names
 from ._view import View
 from ._world import (BEGIN, END, STAY, BodyDistance, BodyDistances, ContactEvents, ContactForces,
                      DebugLines, HitEvents, RayHit, RayHits, ShapeHit, ShapeHits, StepReport, World,
@@ -33,10 +33,10 @@ __all__ = [
     "BodyState", "Bungee", "Buoyancy", "CharacterHit", "CharacterMove", "CharacterSettings", "CharacterState",
     "Closed", "ConcurrentUse", "ContactContext", "ContactEvents", "ContactForces", "ContactRows", "Contacts", "DebugLines",
     "DetectedContacts", "DeviceError", "DistanceJoint", "Drag", "END", "Error", "Explosion", "FileError", "FixedJoint", "ForceContext", "Gravity",
-    "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene", "InvalidSnapshot", "JointId", "JointState",
+    "HingeJoint", "HitEvents", "InvalidArgument", "InvalidScene", "InvalidSnapshot", "Joint", "JointId", "JointState",
     "Nearest", "Neighbors", "OutOfMemory", "PeriodicContactRows", "PeriodicContacts", "PeriodicNearest",
     "PeriodicPairs", "PeriodicRows", "RayHit", "RayHits", "Recording", "RecordingWriter", "Rows", "STAY",
     "Scene", "ShapeHit", "ShapeHits", "SliderJoint", "SphereCollider", "Spring", "States", "StepReport",
     "TrajectoryWriter", "View", "WheelJoint", "World", "WorldContacts", "available_backends", "available_gpus",
-    "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "interpolate", "scene_names",
+    "centred", "find_contacts", "find_nearest", "find_neighbors", "find_pairs", "interpolate", "place_joint", "scene_names",
 ]

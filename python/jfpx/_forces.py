@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, Union
 
 import numpy as np
 
@@ -127,7 +127,8 @@ def interpolate(before: Motion, after: Motion, t: float) -> Motion:
     return BodyState(*(tuple(part.tolist()) for part in parts))
 
 
-Vector = Sequence[float]
+Vector = Union[Sequence[float], "np.ndarray[Any, Any]"]
+"""Numbers of a vector or quaternion: a sequence or an array."""
 
 
 def _optional(body: Any) -> tuple[int, int] | None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import pi
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, Union
+
+import numpy as np
 
 from . import _arrays
 from ._errors import InvalidArgument
-from ._forces import BodyId, Vector, _numbers, _optional
+from ._forces import BodyId, BodyState, Vector, _numbers, _optional
 
 
 class JointId(NamedTuple):
@@ -326,8 +328,100 @@ class WheelJoint(_Joint):
     _name = "wheel"
 
 
+Joint = Union[DistanceJoint, BallJoint, HingeJoint, SliderJoint, FixedJoint, WheelJoint]
+"""A joint of any type."""
+
+JointWithAxes = TypeVar("JointWithAxes", BallJoint, HingeJoint, SliderJoint, FixedJoint, WheelJoint)
+
 _TYPES = {joint._name: joint for joint in (DistanceJoint, BallJoint, HingeJoint, SliderJoint,
                                            FixedJoint, WheelJoint)}
+
+
+def place_joint(joint: JointWithAxes, a: BodyState, b: BodyState | None, point: Vector,
+                axis: Vector, y_axis: Vector | None = None) -> JointWithAxes:
+    """The joint with the frames of its zero position for given poses of its bodies::
+
+        door, frame = world.bodies
+        hinge = jfpx.place_joint(jfpx.HingeJoint(door, frame, min_angle=0, max_angle=2),
+                                 world.state(door), world.state(frame), point=(0, 1, 0), axis=(0, 1, 0))
+        world.add_joint(hinge)
+
+    Parameters
+    ----------
+    joint : BallJoint, HingeJoint, SliderJoint, FixedJoint or WheelJoint
+        Its anchors and axes are replaced.
+    a, b : BodyState
+        Of the bodies of the joint; `b` is None for the world.
+    point : three numbers
+        [m], of both anchors, in the axes of the world.
+    axis : three numbers
+        x axis of the joint in the axes of the world, of any length but 0.
+    y_axis : three numbers, optional
+        The y axis of the joint is as near as possible to it, for example the direction of the
+        suspension of a WheelJoint; any if absent.
+
+    Raises
+    ------
+    InvalidArgument
+        The joint has no axes, a vector is zero, not finite or not of three numbers, or `axis` and
+        `y_axis` are parallel.
+    """
+    if isinstance(joint, type) or not hasattr(joint, "axes_a"):
+        raise InvalidArgument(f"joint is {joint!r}; it must be a joint with axes, such as HingeJoint(...)")
+    if b is None:
+        b = BodyState((0.0, 0.0, 0.0), _IDENTITY, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    axes = _axes_along(axis, y_axis)
+    at = np.array(_arrays.triple(point, "point"))
+    frames: dict[str, Any] = {}
+    for name, state in (("a", a), ("b", b)):
+        if not isinstance(state, BodyState):
+            raise InvalidArgument(f"{name} is of type {type(state).__name__}; it must be a BodyState")
+        w, x, y, z = _arrays.triple(state.orientation, f"{name}.orientation", 4)
+        to_body = np.array((w, -x, -y, -z))
+        arm = at - np.array(_arrays.triple(state.position, f"{name}.position"))
+        turned = _product(_product(to_body, np.array((0.0, *arm))), np.array((w, x, y, z)))
+        frames[f"anchor_{name}"] = tuple(turned[1:].tolist())
+        frames[f"axes_{name}"] = tuple(_product(to_body, axes).tolist())
+    return replace(joint, **frames)
+
+
+def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Of quaternions (w, x, y, z)."""
+    return np.array((p[0] * q[0] - p[1:] @ q[1:],
+                     *(p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))))
+
+
+def _axes_along(axis: Vector, y_axis: Vector | None) -> np.ndarray:
+    """The rotation from joint axes to the axes of the world, as a quaternion."""
+    x = _direction(axis, "axis")
+    if y_axis is None:
+        near = np.eye(3)[np.argmin(np.abs(x))]  # far from x
+    else:
+        near = _direction(y_axis, "y_axis")
+    y = near - x * (x @ near)
+    length = float(np.linalg.norm(y))
+    if length < 1e-6:
+        raise InvalidArgument(f"y_axis is {y_axis}; it must not be parallel to axis")
+    y /= length
+    columns = np.column_stack((x, y, np.cross(x, y)))
+    # The largest of the four components divides the others (Shepperd 1978).
+    m = columns
+    squares = np.array((1 + m[0, 0] + m[1, 1] + m[2, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2],
+                        1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2]))
+    rows = np.array(((squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]),
+                     (m[2, 1] - m[1, 2], squares[1], m[1, 0] + m[0, 1], m[0, 2] + m[2, 0]),
+                     (m[0, 2] - m[2, 0], m[1, 0] + m[0, 1], squares[2], m[2, 1] + m[1, 2]),
+                     (m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[2, 1] + m[1, 2], squares[3])))
+    q: np.ndarray = rows[np.argmax(squares)]
+    return q / np.linalg.norm(q)
+
+
+def _direction(vector: Any, name: str) -> np.ndarray:
+    values = np.array(_arrays.triple(vector, name))
+    length = float(np.linalg.norm(values))
+    if not 0 < length < np.inf:
+        raise InvalidArgument(f"{name} is {vector}; it must be finite and not zero")
+    return values / length
 
 
 def arguments(joint: Any) -> tuple[str, tuple[Any, ...]]:
@@ -338,6 +432,7 @@ def arguments(joint: Any) -> tuple[str, tuple[Any, ...]]:
     return joint._name, joint._values()
 
 
-def joint_of(name: str, fields: tuple[Any, ...]) -> Any:
+def joint_of(name: str, fields: tuple[Any, ...]) -> Joint:
     """A joint from its name and fields."""
-    return _TYPES[name]._of(fields)
+    joint: Joint = _TYPES[name]._of(fields)
+    return joint

@@ -387,6 +387,36 @@ def _not_finite(value: Any, path: str) -> str | None:
     return next((message for message in found if message), None)
 
 
+def centred(shape: Mapping[str, Any]) -> dict[str, Any]:
+    """A compound or hull, translated so that its centre of mass is the origin of its axes, as a
+    movable body requires::
+
+        hammer = jfpx.centred({"type": "compound", "parts": [
+            {"shape": {"type": "cylinder", "radius": 0.02, "half_height": 0.15}},
+            {"shape": {"type": "box", "half_extents": [0.06, 0.02, 0.02]}, "position": [0, 0.15, 0],
+             "density": 8}]})
+        world.add({"shape": hammer, "position": [0, 1, 0]})
+
+    Parameters
+    ----------
+    shape : dict
+        As the field "shape" of a body in a Scene.
+
+    Returns
+    -------
+    dict
+        All fields of the shape. Other shapes are centred, and returned as they are.
+
+    Raises
+    ------
+    InvalidScene
+        A field is unknown or out of range.
+    """
+    scene = Scene({"bodies": [{"shape": shape, "mass": 0}]}, dtype="float64")
+    centred_shape: dict[str, Any] = json.loads(scene._scene.centred().to_json())["bodies"][0]["shape"]
+    return centred_shape
+
+
 def scene_names() -> dict[str, str]:
     """Names of the scenes of Scene.named(), each with a line of description."""
     return dict(_core.f32.scene_names())

@@ -16,7 +16,7 @@ from ._character import CharacterHit, CharacterMove, CharacterSettings, Characte
 from ._errors import Closed, ConcurrentUse, InvalidArgument, InvalidScene
 from ._contact_generators import ContactContext
 from ._forces import BodyId, BodyState, ForceContext, States, Vector
-from ._joints import JointId, JointState, arguments, joint_of
+from ._joints import Joint, JointId, JointState, arguments, joint_of
 from ._scene import Scene, no_gravity
 from ._view import View, view_of_world
 
@@ -853,7 +853,7 @@ class World:
                              _arrays.triple(state.angular_velocity, "angular_velocity"))
 
     def moving_to(self, body: BodyId, position: Vector,
-                  orientation: Sequence[float] | None = None) -> BodyState:
+                  orientation: Vector | None = None) -> BodyState:
         """The state of a body with the velocities that take it to a pose in one step, along the
         shorter arc: to be passed to set_state() before each step of the path of a kinematic body.
         Velocities remain until they are changed, so set them to 0 at the end of the path.
@@ -1062,13 +1062,14 @@ class World:
                                   "or a function")
         return self._core.add_function(functools.partial(_call, force, ForceContext, self._dtype))
 
-    def add_joint(self, joint: Any) -> JointId:
+    def add_joint(self, joint: Joint) -> JointId:
         """Adds a joint, which acts from the next step on, and wakes its bodies. Their contacts with
         each other end, unless the joint lets them collide. Joints are removed with their bodies.
 
         Parameters
         ----------
         joint : DistanceJoint, BallJoint, HingeJoint, SliderJoint, FixedJoint or WheelJoint
+            place_joint() computes anchors and axes.
 
         Raises
         ------
@@ -1078,7 +1079,7 @@ class World:
         """
         return JointId(*self._core.add_joint(*arguments(joint)))
 
-    def set_joint(self, joint_id: JointId, joint: Any) -> None:
+    def set_joint(self, joint_id: JointId, joint: Joint) -> None:
         """Replaces a joint by one of the same type and bodies, for example with another length, and
         wakes its bodies. Raises InvalidArgument as add_joint(), and for an unknown id."""
         self._core.set_joint(_arrays.joint(joint_id), *arguments(joint))
@@ -1092,7 +1093,7 @@ class World:
         """Joints in the order of their indices."""
         return [JointId(*joint_id) for joint_id in self._core.joints()]
 
-    def joint(self, joint_id: JointId) -> Any:
+    def joint(self, joint_id: JointId) -> Joint:
         """The definition of a joint. Raises InvalidArgument for an unknown id."""
         return joint_of(*self._core.joint(_arrays.joint(joint_id)))
 
@@ -1258,7 +1259,7 @@ class World:
         return result
 
     def cast_shape(self, shape: dict[str, Any], position: Vector, translation: Vector,
-                   orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                   orientation: Vector = (1.0, 0.0, 0.0, 0.0), *,
                    filter: Callable[[BodyId], bool] | None = None) -> ShapeHit | None:
         """The first body that a solid touches while it moves along a line without turning, or None;
         of bodies at the same fraction, that with the lowest index. Casts hit all bodies, also
@@ -1292,7 +1293,7 @@ class World:
         return None if hit is None else ShapeHit(BodyId(*hit[0]), *hit[1:])
 
     def cast_shape_through(self, shape: dict[str, Any], position: Vector, translation: Vector,
-                           orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                           orientation: Vector = (1.0, 0.0, 0.0, 0.0), *,
                            filter: Callable[[BodyId], bool] | None = None) -> list[ShapeHit]:
         """All bodies that a moving solid touches, sorted by fraction, then by index; one hit per
         body. Parameters and exceptions are those of cast_shape()."""
@@ -1339,7 +1340,7 @@ class World:
         return result
 
     def closest_body(self, position: Vector, shape: dict[str, Any] | None = None,
-                     orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+                     orientation: Vector = (1.0, 0.0, 0.0, 0.0),
                      max_distance: float = math.inf, *,
                      filter: Callable[[BodyId], bool] | None = None) -> BodyDistance | None:
         """The body that is closest to a point or a solid, or None; of bodies at the same distance,
@@ -1377,7 +1378,7 @@ class World:
 
     def bodies_within(self, position: Vector, max_distance: float,
                       shape: dict[str, Any] | None = None,
-                      orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                      orientation: Vector = (1.0, 0.0, 0.0, 0.0), *,
                       filter: Callable[[BodyId], bool] | None = None) -> list[BodyDistance]:
         """All bodies up to a distance from a point or a solid, sorted by distance, then by index.
         Parameters and exceptions are those of closest_body()."""
@@ -1469,7 +1470,7 @@ class World:
             [CharacterHit(BodyId(*hit[0]), *hit[1:]) for hit in hits])
 
     def overlapping(self, shape: dict[str, Any], position: Vector,
-                    orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0), *,
+                    orientation: Vector = (1.0, 0.0, 0.0, 0.0), *,
                     filter: Callable[[BodyId], bool] | None = None) -> list[BodyId]:
         """Bodies that overlap or touch a solid, in the order of `bodies`. Parameters and exceptions
         are those of cast_shape()."""
@@ -1487,7 +1488,7 @@ class World:
         return [BodyId(*body) for body in found]
 
     def overlapping_box(self, centre: Vector, half_extents: Vector,
-                        orientation: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:
+                        orientation: Vector = (1.0, 0.0, 0.0, 0.0)) -> list[BodyId]:
         """Bodies that overlap or touch a box, in the order of `bodies`. `centre` [m] has numbers in
         [-1e9, 1e9], `half_extents` [m] in (0, 1e9]; `orientation` is a unit quaternion
         (w, x, y, z) to a thousandth of the squared length. Raises InvalidArgument for a number out
@@ -1609,7 +1610,7 @@ def _of_body(filter: Callable[[BodyId], bool] | None) -> Any:
 
 
 def _pose_and_translation(position: Vector, translation: Vector,
-                          orientation: Sequence[float]) -> tuple[Any, Any, Any]:
+                          orientation: Vector) -> tuple[Any, Any, Any]:
     return (_arrays.triple(position, "position"), _arrays.triple(translation, "translation"),
             _arrays.triple(orientation, "orientation", 4))
 

@@ -92,6 +92,18 @@ void bind_scene(nb::module_& module) {
              validate(grown);
              self = std::move(grown);
            })
+      .def("centred",
+           [](const Scene& self) {
+             Scene scene = self;
+             for (BodyDef& body : scene.bodies) {
+               if (auto* compound = std::get_if<Compound>(&body.shape)) {
+                 *compound = centred(std::move(*compound));
+               } else if (auto* hull = std::get_if<Hull>(&body.shape)) {
+                 *hull = centred(*hull);
+               }
+             }
+             return scene;
+           })
       .def("geometry",
            [](const Scene& self) {
              std::vector<ShownBody> bodies;

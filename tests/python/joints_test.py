@@ -33,6 +33,51 @@ def test_a_pendulum_swings_about_its_anchor(dtype):
     assert max(heights) == pytest.approx(0.5**2 / (2 * 9.81), rel=0.02)
 
 
+def turned(q, v):
+    """A vector, or those in rows, turned by a quaternion (w, x, y, z)."""
+    w, u = q[0], np.array(q[1:])
+    return v + 2 * np.cross(u, np.cross(u, v) + w * v)
+
+
+def test_place_joint_puts_the_frames_of_both_bodies_in_one_place():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        world = row_of_balls(2, dtype="float64")
+        states = []
+        for body in world.bodies:
+            q = rng.normal(size=4)
+            states.append(jfpx.BodyState(rng.normal(size=3), q / np.linalg.norm(q)))
+            world.set_state(body, states[-1])
+        point, axis, y_axis = rng.normal(size=(3, 3))
+        joint = jfpx.WheelJoint(*world.bodies, hertz=2)
+        for b in (states[1], None):
+            placed = jfpx.place_joint(joint, states[0], b, point, axis, y_axis)
+            assert placed.hertz == 2
+            other = b or jfpx.BodyState((0, 0, 0))
+            for state, anchor, axes in ((states[0], placed.anchor_a, placed.axes_a),
+                                        (other, placed.anchor_b, placed.axes_b)):
+                np.testing.assert_allclose(state.position + turned(state.orientation, np.array(anchor)), point)
+                x, y = (turned(state.orientation, turned(axes, np.array(v))) for v in ((1, 0, 0), (0, 1, 0)))
+                np.testing.assert_allclose(x, axis / np.linalg.norm(axis), atol=1e-12)
+                assert y @ y_axis > 0 and abs(np.cross(x, y) @ y_axis) < 1e-12
+        number = world.add_joint(jfpx.place_joint(joint, *states, point, axis))
+        state = world.joint_state(number)
+        assert state.length < 1e-9 and state.position == pytest.approx(0, abs=1e-9)
+
+
+def test_errors_of_place_joint_name_the_argument():
+    world = row_of_balls(2)
+    hinge, state = jfpx.HingeJoint(world.bodies[0]), world.state(world.bodies[0])
+    for arguments, message in (
+            ((jfpx.DistanceJoint(world.bodies[0]), state, None, (0, 0, 0), (1, 0, 0)), "a joint with axes"),
+            ((hinge, state, None, (0, 0, 0), (0, 0, 0)), "axis"),
+            ((hinge, state, None, (0, 0, 0), (1, 0, 0), (2, 0, 0)), "parallel"),
+            ((hinge, world.bodies[0], None, (0, 0, 0), (1, 0, 0)), "a is of type BodyId"),
+            ((hinge, state, None, (0, 0), (1, 0, 0)), "point")):
+        with pytest.raises(jfpx.InvalidArgument, match=message):
+            jfpx.place_joint(*arguments)
+
+
 def test_joints_are_added_changed_and_removed():
     world = row_of_balls(3)
     a, b, c = world.bodies

@@ -29,6 +29,7 @@ def test_a_type_checker_sees_the_names_and_the_results(tmp_path):
     program.write_text("""
 import jfpx
 import jfpx.mpi
+import numpy as np
 points = [[0.0, 0.0, 0.0]]
 contacts: jfpx.Contacts = jfpx.find_contacts(points, 1.0)
 rows: jfpx.Rows = jfpx.find_pairs(points, 1.0, output="csr")
@@ -37,6 +38,10 @@ report: jfpx.StepReport = jfpx.World("pile").step()
 ranks: jfpx.mpi.Communicator = jfpx.mpi.Communicator()
 rank: int = ranks.rank
 world = jfpx.World("pile", communicator=ranks)
+hinge: jfpx.HingeJoint = jfpx.place_joint(
+    jfpx.HingeJoint(world.bodies[0]), world.state(world.bodies[0]), None, np.zeros(3), (1, 0, 0))
+joint: jfpx.Joint = world.joint(world.add_joint(hinge))
+world.apply_impulse(world.bodies[0], np.ones(3))
 """)
     errors, _, status = api.run(["--strict", "--no-incremental", str(program)])
     assert status == 0, errors

@@ -591,6 +591,20 @@ def test_distances_agree_with_the_formula_of_a_sphere(rng, dtype):
     assert world.closest_body((0, 0, 99), max_distance=9) is None
 
 
+def test_centred_shapes_have_their_centre_of_mass_at_the_origin():
+    box = {"type": "box", "half_extents": [0.5, 0.5, 0.5]}
+    shape = jfpx.centred({"type": "compound", "parts": [
+        {"shape": box, "position": [1, 2, 3]}, {"shape": box, "position": [3, 2, 3], "density": 3}]})
+    assert [part["position"] for part in shape["parts"]] == [[-1.5, 0, 0], [0.5, 0, 0]]
+    jfpx.Scene({"bodies": [{"shape": shape}]})  # movable
+    corners = [[x, y, z] for x in (0, 2) for y in (0, 1) for z in (5, 6)]
+    hull = jfpx.centred({"type": "hull", "vertices": corners})
+    np.testing.assert_allclose(np.mean(hull["vertices"], axis=0), 0, atol=1e-12)
+    assert jfpx.centred(box)["half_extents"] == [0.5, 0.5, 0.5]
+    with pytest.raises(jfpx.InvalidScene, match="density"):
+        jfpx.centred({"type": "compound", "parts": [{"shape": box, "density": -1}]})
+
+
 def test_a_character_walks_pushes_and_jumps(dtype):
     crate = {"shape": {"type": "box", "half_extents": [0.5, 0.5, 0.5]}, "position": [3, 0.5, 0], "mass": 20}
     world = jfpx.World({"bodies": [GROUND, crate]}, dtype=dtype)
