@@ -363,15 +363,20 @@ def place_joint(joint: JointWithAxes, a: BodyState, b: BodyState | None, point: 
     Raises
     ------
     InvalidArgument
-        The joint has no axes, a vector is zero, not finite or not of three numbers, or `axis` and
-        `y_axis` are parallel.
+        The joint has no axes, `b` is None but not that of the joint, or the reverse, a vector is
+        zero, not finite or not of three numbers, or `axis` and `y_axis` are parallel.
     """
     if isinstance(joint, type) or not hasattr(joint, "axes_a"):
         raise InvalidArgument(f"joint is {joint!r}; it must be a joint with axes, such as HingeJoint(...)")
+    if (b is None) != (joint.b is None):
+        given, used = ("absent", "joint.b is a body") if b is None else ("a state", "joint.b is the world")
+        raise InvalidArgument(f"b is {given}, but {used}")
     if b is None:
         b = BodyState((0.0, 0.0, 0.0), _IDENTITY, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     axes = _axes_along(axis, y_axis)
     at = np.array(_arrays.triple(point, "point"))
+    if not np.all(np.isfinite(at)):
+        raise InvalidArgument(f"point is {point}; it must be finite")
     frames: dict[str, Any] = {}
     for name, state in (("a", a), ("b", b)):
         if not isinstance(state, BodyState):
@@ -418,10 +423,11 @@ def _axes_along(axis: Vector, y_axis: Vector | None) -> np.ndarray:
 
 def _direction(vector: Any, name: str) -> np.ndarray:
     values = np.array(_arrays.triple(vector, name))
-    length = float(np.linalg.norm(values))
-    if not 0 < length < np.inf:
+    largest = float(np.max(np.abs(values)))
+    if not 0 < largest < np.inf:
         raise InvalidArgument(f"{name} is {vector}; it must be finite and not zero")
-    return values / length
+    values /= largest
+    return values / np.linalg.norm(values)
 
 
 def arguments(joint: Any) -> tuple[str, tuple[Any, ...]]:

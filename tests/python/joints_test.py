@@ -50,8 +50,8 @@ def test_place_joint_puts_the_frames_of_both_bodies_in_one_place():
             world.set_state(body, states[-1])
         point, axis, y_axis = rng.normal(size=(3, 3))
         joint = jfpx.WheelJoint(*world.bodies, hertz=2)
-        for b in (states[1], None):
-            placed = jfpx.place_joint(joint, states[0], b, point, axis, y_axis)
+        for b, used in ((states[1], joint), (None, jfpx.WheelJoint(world.bodies[0], hertz=2))):
+            placed = jfpx.place_joint(used, states[0], b, point, 1e200 * axis, y_axis)
             assert placed.hertz == 2
             other = b or jfpx.BodyState((0, 0, 0))
             for state, anchor, axes in ((states[0], placed.anchor_a, placed.axes_a),
@@ -68,7 +68,11 @@ def test_place_joint_puts_the_frames_of_both_bodies_in_one_place():
 def test_errors_of_place_joint_name_the_argument():
     world = row_of_balls(2)
     hinge, state = jfpx.HingeJoint(world.bodies[0]), world.state(world.bodies[0])
+    joined = jfpx.HingeJoint(*world.bodies)
     for arguments, message in (
+            ((joined, state, None, (0, 0, 0), (1, 0, 0)), "b is absent, but joint.b is a body"),
+            ((hinge, state, state, (0, 0, 0), (1, 0, 0)), "b is a state, but joint.b is the world"),
+            ((hinge, state, None, (0, math.nan, 0), (1, 0, 0)), "point is .*finite"),
             ((jfpx.DistanceJoint(world.bodies[0]), state, None, (0, 0, 0), (1, 0, 0)), "a joint with axes"),
             ((hinge, state, None, (0, 0, 0), (0, 0, 0)), "axis"),
             ((hinge, state, None, (0, 0, 0), (1, 0, 0), (2, 0, 0)), "parallel"),
