@@ -408,9 +408,8 @@ def _axes_along(axis: Vector, y_axis: Vector | None) -> np.ndarray:
     if length < 1e-6:
         raise InvalidArgument(f"y_axis is {y_axis}; it must not be parallel to axis")
     y /= length
-    columns = np.column_stack((x, y, np.cross(x, y)))
+    m = np.column_stack((x, y, np.cross(x, y)))
     # The largest of the four components divides the others (Shepperd 1978).
-    m = columns
     squares = np.array((1 + m[0, 0] + m[1, 1] + m[2, 2], 1 + m[0, 0] - m[1, 1] - m[2, 2],
                         1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2]))
     rows = np.array(((squares[0], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]),

@@ -380,11 +380,13 @@ def _not_finite(value: Any, path: str) -> str | None:
         value = value.tolist()
     if isinstance(value, float) and not math.isfinite(value):
         return f"{path} is {value}; it must be finite"
-    found = (_not_finite(item, f"{path}.{key}" if path else str(key)) for key, item in value.items()
-             ) if isinstance(value, Mapping) else (
-             _not_finite(item, f"{path}[{i}]") for i, item in enumerate(value)
-             ) if isinstance(value, (list, tuple)) else iter(())
-    return next((message for message in found if message), None)
+    items: Any = ()
+    if isinstance(value, Mapping):
+        items = ((f"{path}.{key}" if path else str(key), item) for key, item in value.items())
+    elif isinstance(value, (list, tuple)):
+        items = ((f"{path}[{i}]", item) for i, item in enumerate(value))
+    messages = (_not_finite(item, name) for name, item in items)
+    return next((message for message in messages if message), None)
 
 
 def centred(shape: Mapping[str, Any]) -> dict[str, Any]:
